@@ -96,7 +96,7 @@ TEST(CircuitCamera, ThreadsAndTilesDoNotChangeItsEvents) {
       camera.integrate(std::vector{segment(left, k, k + 1)}, k * 2 * kNsPerMs, workers);
       camera.integrate(std::vector{segment(right, k, k + 1), segment(right, k + 1, k + 2), segment(left, k + 1, k + 2)},
                        (k + 2) * 2 * kNsPerMs, workers);
-      camera.release_until((k + 2) * 2 * kNsPerMs, events);
+      std::ranges::copy(camera.release_until((k + 2) * 2 * kNsPerMs), std::back_inserter(events));
     }
     EXPECT_EQ(events, expected) << has_readout;
   }

@@ -31,9 +31,8 @@ class Feed {
 
   /// The events up to `until` that have not been returned yet.
   std::vector<Event> events(TimeNs until = std::numeric_limits<TimeNs>::max()) {
-    std::vector<Event> events;
-    camera_.release_until(until, events);
-    return events;
+    const EventSpan events = camera_.release_until(until);
+    return {events.begin(), events.end()};
   }
 
   const EventCamera& camera() const { return camera_; }

@@ -222,7 +222,7 @@ TEST_P(Labels, DoNotDependOnThreadsOrTiles) {
     if (k > 0) rest.push_back(segment(right, k - 1));
     rest.push_back(segment(right, k));
     camera.integrate(rest, time(k), workers);
-    camera.release_until(time(k), tiled.events);
+    std::ranges::copy(camera.release_until(time(k)), std::back_inserter(tiled.events));
     tiled.labels.insert(tiled.labels.end(), camera.labels().begin(), camera.labels().end());
   }
   EXPECT_EQ(tiled.events, expected.events);
@@ -321,7 +321,7 @@ TEST_P(LabelsAgainstReference, AreTheSame) {
     defined.labels.insert(defined.labels.end(), reference.labels().begin(), reference.labels().end());
     t += 1 + static_cast<TimeNs>(random() % 2'000'000);
   }
-  camera.release_until(std::numeric_limits<TimeNs>::max(), fast.events);
+  std::ranges::copy(camera.release_until(std::numeric_limits<TimeNs>::max()), std::back_inserter(fast.events));
   fast.labels.insert(fast.labels.end(), camera.labels().begin(), camera.labels().end());
   // The front end and the low-pass use floats, which limits the accuracy of times and parts. Thresholds with noise are
   // floats, too, and their rounding adds up in the references.

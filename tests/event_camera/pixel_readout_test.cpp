@@ -154,7 +154,7 @@ std::vector<Event> feed_tiles(const EventCameraOptions& options, const std::vect
     if (segments.empty()) continue;
     const TimeNs watermark = at(*std::ranges::min_element(known));
     camera.integrate(segments, watermark, Workers(2));
-    camera.release_until(watermark, events);
+    std::ranges::copy(camera.release_until(watermark), std::back_inserter(events));
   }
   return events;
 }

@@ -3,11 +3,12 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <limits>
 #include <random>
 #include <utility>
 
 #include "esim/events/event_queue.h"
-#include "esim/events/event_sorter.h"
+#include "esim/events/sort_packed.h"
 
 namespace esim {
 namespace {
@@ -69,60 +70,86 @@ void add(PackedEvents& part, const Event& event) {
   part.add(2, part.packing().origin, times, places, polarities, reported);
 }
 
-TEST(EventSorter, AgreesWithStdSort) {
-  const Workers one(1), three(3);
+TEST(SortPacked, AgreesWithStdSort) {
   unsigned seed = 0;
-  EventSorter sorter;
   for (const std::size_t count : {0, 1, 2, 63, 64, 257, 5000, 20000}) {
     for (const TimeNs span : {TimeNs{1}, TimeNs{3}, TimeNs{2048}, TimeNs{2049}, TimeNs{1'000'000}, TimeNs{1} << 50}) {
-      std::vector<Event> expected = random_events(count, span, ++seed);
-      EventBuffer sorted;
       EventPacking packing(kWidth, kHeight);
       packing.origin = -5;
-      for (const Workers* workers : {&one, &three}) {
-        std::vector<PackedEvents> parts(3);
-        for (PackedEvents& part : parts) part.expect(packing, seed % 2 == 0 ? span : span / 3);
-        for (std::size_t i = 0; i < count; ++i) add(parts[(i * i) % 3], expected[i]);
-        sorter.sort(parts, *workers, sorted);
-        std::sort(expected.begin(), expected.end());
-        EXPECT_TRUE(std::ranges::equal(sorted.events(), expected)) << count << " events over " << span << " ns";
-        for (const auto& part : parts) EXPECT_EQ(part.size(), 0U);
-      }
+      std::vector<std::uint64_t> events, scratch(count);
+      for (const Event& event : random_events(count, span, ++seed)) events.push_back(packed(packing, event));
+      std::vector<std::uint64_t> expected = events;
+      std::sort(expected.begin(), expected.end());
+      sort_packed(events, scratch, packing);
+      EXPECT_EQ(events, expected) << count << " events over " << span << " ns";
     }
   }
 }
 
-TEST(EventQueue, ReleasesInOrderWhateverTheOrderOfArrival) {
-  std::vector<Event> events = random_events(3000, 1000, 77);
-  std::vector<Event> expected = events;
-  std::sort(expected.begin(), expected.end());
+/// A queue, and the slow reference: all waiting events in a list.
+struct QueueAndList {
+  EventQueue queue{kWidth, kHeight};
+  std::vector<Event> list;
 
-  // An event may arrive at any time before the watermark passes it.
-  const Workers one(1);
-  EventPacking packing(kWidth, kHeight);
-  packing.origin = -5;
-  std::mt19937 random(1);
-  EventQueue queue;
-  std::vector<Event> released;
-  std::vector<PackedEvents> parts(2);
-  for (PackedEvents& part : parts) part.expect(packing, 1000);
-  for (TimeNs watermark = -10; watermark < 1200; watermark += 13) {
-    for (auto it = events.begin(); it != events.end();) {
-      if (it->t <= watermark || random() % 10 == 0) {
-        add(parts[random() % 2], *it);
-        it = events.erase(it);
-      } else {
-        ++it;
-      }
-    }
-    queue.add(parts, one);
-    for (const Event& event : queue.release_until(watermark)) {
-      EXPECT_LE(event.t, watermark);
-      released.push_back(event);
-    }
+  void add(const std::vector<Event>& events, TimeNs origin, TimeNs end, unsigned seed) {
+    EventPacking packing(kWidth, kHeight);
+    packing.origin = origin;
+    std::vector<PackedEvents> parts(1 + seed % 3);
+    for (PackedEvents& part : parts) part.set_packing(packing);
+    for (std::size_t i = 0; i < events.size(); ++i) esim::add(parts[(i * i + seed) % parts.size()], events[i]);
+    list.insert(list.end(), events.begin(), events.end());
+    std::sort(list.begin(), list.end());
+    queue.add(parts, end);
+    for (const auto& part : parts) EXPECT_EQ(part.size(), 0U);
   }
-  EXPECT_EQ(released, expected);
-  EXPECT_EQ(queue.size(), 0U);
+
+  void release(TimeNs watermark) {
+    const auto end = std::ranges::upper_bound(list, watermark, {}, &Event::t);
+    const std::vector<Event> expected(list.begin(), end);
+    list.erase(list.begin(), end);
+    EXPECT_TRUE(std::ranges::equal(queue.release_until(watermark), expected)) << "until " << watermark;
+    EXPECT_EQ(queue.size(), list.size());
+  }
+};
+
+/// Intervals of all lengths, events far beyond the expected end, long waits, a start before the waiting events, small
+/// and large watermarks, events removed, and states restored.
+TEST(EventQueue, AgreesWithASortedList) {
+  const Workers one(1), three(3);
+  for (unsigned seed = 0; seed < 60; ++seed) {
+    std::mt19937_64 random(seed);
+    const auto below = [&](std::uint64_t most) { return static_cast<TimeNs>(random() % most); };
+    QueueAndList both;
+    TimeNs now = below(1000) - 500;
+    TimeNs step = TimeNs{1} << below(34);
+    for (int round = 0; round < 40; ++round) {
+      if (below(8) == 0) step = TimeNs{1} << below(34);
+      const TimeNs origin = now + 1 + below(static_cast<std::uint64_t>(step) / 4 + 1), end = origin + step;
+      std::vector<Event> events = random_events(static_cast<std::size_t>(below(5) == 0 ? 3000 : below(40)), step, seed);
+      for (Event& event : events) {
+        event.t += 5 + origin;
+        if (below(50) == 0) event.t += below(100) * step;
+      }
+      both.add(events, origin, end, seed);
+      const TimeNs watermark = now + below(static_cast<std::uint64_t>(below(3) == 0 ? 4 * step : step));
+      if (below(3) != 0) both.queue.sort_until(watermark, below(2) == 0 ? one : three);
+      if (below(4) == 0) both.release(watermark - (watermark - now) / 2);
+      if (below(6) == 0) {
+        const auto odd = [](const Event& event) { return (event.t & 3) == 1; };
+        both.queue.remove_if(odd);
+        std::erase_if(both.list, odd);
+      }
+      EXPECT_EQ(both.queue.waiting(), both.list);
+      if (below(6) == 0) {
+        both.queue.add({}, 0);
+        both.queue.restore(both.list);
+      }
+      both.release(watermark);
+      now = watermark;
+    }
+    both.release(std::numeric_limits<TimeNs>::max());
+    EXPECT_TRUE(both.list.empty());
+  }
 }
 
 }  // namespace

@@ -11,8 +11,7 @@ int main() {
   const esim::Segment first{dark.bounds(), 0, 0, &dark, &dark}, second{dark.bounds(), 0, 1'000'000, &dark, &bright};
   camera.integrate(std::span(&first, 1), 0, workers);
   camera.integrate(std::span(&second, 1), second.t1, workers);
-  std::vector<esim::Event> events;
-  camera.release_until(1'000'000, events);
+  const esim::EventSpan events = camera.release_until(1'000'000);
   std::printf("%zu events, %zu bytes of options\n", events.size(), sizeof(esim::Scenario));
   return events.size() == 12 * 5 ? 0 : 1;  // ln(0.301 / 0.101) = 5.46 thresholds
 }

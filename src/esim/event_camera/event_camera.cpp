@@ -47,7 +47,8 @@ struct EventCamera::State {
   State(const EventCameraOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream)
       : pixels(options, options.circuit ? 0 : width, options.circuit ? 0 : height, seed, stream),
         packing(width, height),
-        size{0, 0, width, height} {
+        size{0, 0, width, height},
+        queue(width, height) {
     check(options);
     refuse(find_problem(options.filters, width, height), "event_camera.filters.");
     if (options.circuit) circuit.emplace(options, width, height, seed, stream);
@@ -58,8 +59,8 @@ struct EventCamera::State {
     if (options.filters.any()) filters.emplace(options.filters, width, height);
   }
 
-  void read_out_until(TimeNs until, std::vector<Event>& out);
-  void filter(std::size_t begin, std::vector<Event>& out);
+  EventSpan read_out_until(TimeNs until);
+  EventSpan filter(EventSpan unfiltered);
   bool integrate(const Workers& workers);
   bool integrate_one(std::size_t i, const Workers& workers);
   bool integrate_tiles(const Workers& workers);
@@ -102,7 +103,7 @@ struct EventCamera::State {
   std::optional<PixelReadout> readout;
   std::optional<CircuitReadout> circuit_readout;
   std::optional<FilterChain> filters;
-  std::vector<Event> unfiltered;
+  std::vector<Event> from_readout, filtered;
   std::int64_t read_out = 0;  // number of events
 
   std::optional<PendingLabels> labels;
@@ -221,7 +222,7 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
   for (const Segment& segment : segments) first = std::min(first, segment.t0), last = std::max(last, segment.t1);
   state.packing.origin = first;
   state.refuse_long_time(last - first);
-  for (PackedEvents& events : state.events) events.expect(state.packing, last - first);
+  for (PackedEvents& events : state.events) events.set_packing(state.packing);
   state.segments = segments;
   if (state.readout) state.readout->history.add(segments, state.pixels);
   if (state.circuit_readout) {
@@ -231,7 +232,8 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
     state.spoiled = true;
     for (const Segment& segment : segments) check_irradiance(segment);
   }
-  state.queue.add(state.events, workers);
+  state.queue.add(state.events, last);
+  state.queue.sort_until(watermark, workers);
   PendingLabels* const labels = state.labels ? &*state.labels : nullptr;
   if (labels != nullptr) {
     for (PackedEvents& events : state.events) labels->add(events.labels);
@@ -246,32 +248,32 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
   state.watermark = watermark;
 }
 
-/// Appends to `out` the events that leave the readout.
-void EventCamera::State::read_out_until(TimeNs until, std::vector<Event>& out) {
-  if (readout) return readout->release_until(until, out);
-  if (circuit_readout) return circuit_readout->release_until(until, out);
-  const EventSpan released = queue.release_until(until);
-  out.insert(out.end(), released.begin(), released.end());
+/// The events that leave the readout.
+EventSpan EventCamera::State::read_out_until(TimeNs until) {
+  if (!readout && !circuit_readout) return queue.release_until(until);
+  from_readout.clear();
+  if (readout) readout->release_until(until, from_readout);
+  if (circuit_readout) circuit_readout->release_until(until, from_readout);
+  return from_readout;
 }
 
-/// Passes the events of the readout from `begin` in `out` on through the filters. Keeps the labels of those that pass.
-void EventCamera::State::filter(std::size_t begin, std::vector<Event>& out) {
-  unfiltered.assign(out.begin() + static_cast<std::ptrdiff_t>(begin), out.end());
-  out.resize(begin);
-  filters->process(unfiltered, out);
-  if (labels) keep_labels_of_passed(unfiltered, EventSpan(out).subspan(begin), released_labels);
+/// The events that pass the filters. Keeps their labels.
+EventSpan EventCamera::State::filter(EventSpan unfiltered) {
+  filtered.clear();
+  filters->process(unfiltered, filtered);
+  if (labels) keep_labels_of_passed(unfiltered, filtered, released_labels);
+  return filtered;
 }
 
-void EventCamera::release_until(TimeNs until, std::vector<Event>& out) {
+EventSpan EventCamera::release_until(TimeNs until) {
   State& state = *state_;
-  const std::size_t begin = out.size();
-  state.read_out_until(until, out);
-  state.read_out += static_cast<std::int64_t>(out.size() - begin);
+  const EventSpan events = state.read_out_until(until);
+  state.read_out += static_cast<std::int64_t>(events.size());
   if (state.labels) {
     state.released_labels.clear();
-    state.labels->take(EventSpan(out).subspan(begin), state.released_labels);
+    state.labels->take(events, state.released_labels);
   }
-  if (state.filters) state.filter(begin, out);
+  return state.filters ? state.filter(events) : events;
 }
 
 LabelSpan EventCamera::labels() const { return state_->released_labels; }
@@ -316,7 +318,8 @@ void EventCamera::process(std::span<const float> irradiance, TimeNs t, std::vect
   } catch (const UserError& error) {
     throw UserError(frame + ": " + error.what());
   }
-  release_until(t, out);
+  const EventSpan events = release_until(t);
+  out.insert(out.end(), events.begin(), events.end());
   std::swap(state.last_frame, state.next_frame);
   state.last_time = t;
   ++state.frames;

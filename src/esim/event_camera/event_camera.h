@@ -64,11 +64,11 @@ class EventCamera {
   /// before it. It must not decrease.
   void integrate(std::span<const Segment> segments, TimeNs watermark, const Workers& workers);
 
-  /// Appends to `out`, in order, the events with t <= until that were not released before. `until` must not be later
-  /// than the watermark of the last integrate().
-  void release_until(TimeNs until, std::vector<Event>& out);
+  /// Returns, in order, the events with t <= until that were not released before; they are valid until the next call.
+  /// `until` must not be later than the watermark of the last integrate().
+  EventSpan release_until(TimeNs until);
 
-  /// The labels of the events that the last release_until() or process() appended, in their order, with object 0 and
+  /// The labels of the events of the last release_until() or process(), in their order, with object 0 and
   /// semantic class 0; empty unless the options request labels.
   LabelSpan labels() const;
   bool has_labels() const;

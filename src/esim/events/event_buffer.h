@@ -21,17 +21,25 @@ class EventBuffer {
     return *this;
   }
 
-  /// Resizes to `count` events, each of which must be written before it is read.
-  Event* make_room(std::size_t count) {
+  /// Adds `count` events at the end, each of which must be written before it is read.
+  Event* extend(std::size_t count) {
     static_assert(std::is_trivially_copyable_v<Event>);
-    if (count > capacity_) {
+    if (size_ + count > capacity_) {
       EventBuffer larger;
-      larger.events_ = LargeAllocator<Event>().allocate(2 * count);
-      larger.capacity_ = 2 * count;
+      larger.capacity_ = 2 * (size_ + count);
+      larger.events_ = LargeAllocator<Event>().allocate(larger.capacity_);
+      larger.size_ = size_;
+      std::copy_n(events_, size_, larger.events_);
       swap(larger);
     }
-    size_ = count;
-    return events_;
+    size_ += count;
+    return events_ + size_ - count;
+  }
+
+  /// Removes the first events.
+  void drop(std::size_t count) {
+    if (count < size_) std::copy(events_ + count, events_ + size_, events_);
+    size_ -= count;
   }
 
   /// Removes the events from index `first` on for which predicate(event) is true.
@@ -42,14 +50,14 @@ class EventBuffer {
 
   EventSpan events() const { return {events_, size_}; }
   std::size_t size() const { return size_; }
-  std::size_t capacity() const { return capacity_; }
+
+ private:
   void swap(EventBuffer& other) noexcept {
     std::swap(events_, other.events_);
     std::swap(size_, other.size_);
     std::swap(capacity_, other.capacity_);
   }
 
- private:
   Event* events_ = nullptr;
   std::size_t size_ = 0, capacity_ = 0;
 };

@@ -46,6 +46,9 @@ class EventPacking {
     out.polarity = static_cast<std::int8_t>(polarity);
   }
 
+  /// The time since the origin.
+  TimeNs time(std::uint64_t packed) const { return static_cast<TimeNs>(packed >> time_shift_); }
+
   int time_shift() const { return time_shift_; }
 
  private:

@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <future>
 #include <limits>
 #include <map>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -13,17 +13,20 @@
 #include "esim/files/codecs/zstandard.h"
 #include "esim/files/input_file.h"
 #include "esim/sample_store/layout.h"
+#include "esim/sample_store/read_ahead.h"
 
 namespace esim::inline sample_store {
 namespace {
 
 constexpr int kMaxExtent = 16384;  // px, as in scenarios
+constexpr std::size_t kBlocksAhead = 3;
 
 /// What files end within.
 constexpr const char* kSamples =
     "the samples: their recording was interrupted, or the file was truncated; simulate again";
 
-/// Irradiance of consecutive pixels before and after their differences, of which `Planes` bytes are not 0.
+/// Irradiance of consecutive pixels after their differences, of which `Planes` bytes are not 0, and, unless `from` is
+/// null, before them.
 template <std::size_t Planes>
 void undo_row(std::size_t count, const std::array<const std::uint8_t*, kPlanes>& bytes, int dropped_bits,
               std::uint32_t* __restrict codes, float* __restrict from, float* __restrict to) {
@@ -34,7 +37,7 @@ void undo_row(std::size_t count, const std::array<const std::uint8_t*, kPlanes>&
     if constexpr (Planes > 3) difference |= static_cast<std::uint32_t>(d[i]) << 24;
     const std::uint32_t before = codes[i], now = undo_difference(difference, before);
     codes[i] = now;
-    from[i] = irradiance_of(before, dropped_bits);
+    if (from != nullptr) from[i] = irradiance_of(before, dropped_bits);
     to[i] = irradiance_of(now, dropped_bits);
   }
 }
@@ -53,6 +56,8 @@ T value_of(std::span<const std::byte> bytes) {
 }  // namespace
 
 struct SampleStoreReader::Impl {
+  static constexpr std::size_t kNone = std::numeric_limits<std::size_t>::max();
+
   /// A block of segments.
   struct Block {
     std::vector<PortionEntry> portions;
@@ -60,8 +65,9 @@ struct SampleStoreReader::Impl {
     std::array<std::vector<std::uint8_t>, kPlanes> planes;
     std::size_t used_planes = kPlanes;  // the others are 0
     std::vector<float> irradiance;      // of all segments; with that of their start
-    std::vector<float> start;           // of those that start where their pixels were
+    std::vector<float> start;           // of those that start where their pixels were before the block
     std::vector<std::size_t> first;     // of each segment's pixels in `irradiance`
+    std::vector<std::size_t> previous;  // the previous segment of the tile in this block, or kNone
     std::vector<Segment> segments;
   };
 
@@ -87,7 +93,7 @@ struct SampleStoreReader::Impl {
   bool next_block(const Workers& workers);
   bool read(Block& block, const Workers& workers);
   void read_lists(const BlockHeader& header, std::span<const std::byte> compressed, Block& block);
-  void check_segment(const SegmentEntry& entry);
+  void check_segment(std::size_t segment, Block& block);
   void undo_differences(Rows rows, Block& block);
   [[noreturn]] void damaged(const std::string& what) const { file.fail(block_offset, "the block is damaged: " + what); }
 
@@ -97,32 +103,40 @@ struct SampleStoreReader::Impl {
   Image<std::uint32_t> last;
   std::uint64_t block_offset = 0;
   TimeNs watermark = std::numeric_limits<TimeNs>::min();  // of the last portion
-  std::map<std::array<std::uint16_t, 4>, TimeNs> ends;    // of the last segment of each tile
-  Image<std::uint8_t> covered;                            // by these tiles
+  struct LastSegment {
+    TimeNs end = 0;
+    std::uint64_t block_offset = 0;
+    std::size_t index = 0;  // in the block
+  };
+  std::map<std::array<std::uint16_t, 4>, LastSegment> last_segments;  // of each tile
+  Image<std::uint8_t> covered;                                        // by these tiles
   bool ended = false;
   bool must_be_key = false;  // the next block
 
-  Block current, ahead;  // handed out, and read meanwhile
-  Workers one_thread{1};
-  std::future<bool> reading;  // of `ahead`; destroyed first
+  Block current;  // handed out
   std::size_t next_portion = 0, next_segment = 0;
   Portion portion;
+  Workers one_thread{1};
+  std::optional<ReadAhead<Block>> blocks_ahead;  // destroyed first: it uses the others
 };
 
 /// Tiles divide the image, and the segments of each follow each other.
-void SampleStoreReader::Impl::check_segment(const SegmentEntry& entry) {
+void SampleStoreReader::Impl::check_segment(std::size_t segment, Block& block) {
+  const SegmentEntry& entry = block.entries[segment];
   const bool inside = entry.width >= 1 && entry.height >= 1 && entry.x + entry.width <= info.width &&
                       entry.y + entry.height <= info.height;
   if (!inside || entry.own_start > 1) damaged("a tile is outside the image");
   if (entry.t1 < entry.t0 || entry.t0 < info.start || entry.t1 > info.end) damaged("a time is outside the simulation");
-  const auto [done, is_new] = ends.try_emplace({entry.x, entry.y, entry.width, entry.height}, entry.t0);
+  const auto [found, is_new] =
+      last_segments.try_emplace({entry.x, entry.y, entry.width, entry.height}, LastSegment{entry.t0, 0, 0});
   for (int y = entry.y; is_new && y < entry.y + entry.height; ++y) {
     for (int x = entry.x; x < entry.x + entry.width; ++x) {
       if (std::exchange(covered(x, y), std::uint8_t{1}) != 0) damaged("tiles overlap");
     }
   }
-  if (entry.t0 != done->second) damaged("a segment does not begin where the previous one of its tile ended");
-  done->second = entry.t1;
+  const LastSegment before = std::exchange(found->second, {entry.t1, block_offset, segment});
+  if (entry.t0 != before.end) damaged("a segment does not begin where the previous one of its tile ended");
+  block.previous[segment] = before.block_offset == block_offset ? before.index : kNone;
 }
 
 void SampleStoreReader::Impl::read_lists(const BlockHeader& header, std::span<const std::byte> compressed,
@@ -144,9 +158,10 @@ void SampleStoreReader::Impl::read_lists(const BlockHeader& header, std::span<co
     watermark = entry.watermark;
     counted += entry.segments;
   }
-  for (const SegmentEntry& entry : entries) {
-    check_segment(entry);
-    pixels += (1 + entry.own_start) * entry.width * std::uint64_t{entry.height};
+  block.previous.resize(entries.size());
+  for (std::size_t i = 0; i < entries.size(); ++i) {
+    check_segment(i, block);
+    pixels += (1 + entries[i].own_start) * entries[i].width * std::uint64_t{entries[i].height};
   }
   if (counted != entries.size() || pixels != header.pixels) damaged("it has another number of segments or pixels");
 }
@@ -158,13 +173,15 @@ void SampleStoreReader::Impl::undo_differences(Rows rows, Block& block) {
     const SegmentEntry& entry = block.entries[segment];
     const int first_row = std::max<int>(rows.first, entry.y), last_row = std::min(rows.last, entry.y + entry.height);
     const std::size_t width = entry.width, area = width * entry.height;
+    const bool needs_start = block.previous[segment] == kNone;
     for (std::uint64_t part = 0; part <= entry.own_start; ++part) {
       for (int y = first_row; y < last_row; ++y) {
         const std::size_t i = block.first[segment] + part * area + static_cast<std::size_t>(y - entry.y) * width;
         const std::array<const std::uint8_t*, kPlanes> bytes{block.planes[0].data() + i, block.planes[1].data() + i,
                                                              block.planes[2].data() + i, block.planes[3].data() + i};
         const auto undo = block.used_planes <= 2 ? undo_row<2> : block.used_planes == 3 ? undo_row<3> : undo_row<4>;
-        undo(width, bytes, dropped, last.row(y) + entry.x, block.start.data() + i, block.irradiance.data() + i);
+        undo(width, bytes, dropped, last.row(y) + entry.x, needs_start ? block.start.data() + i : nullptr,
+             block.irradiance.data() + i);
       }
     }
   }
@@ -215,11 +232,17 @@ bool SampleStoreReader::Impl::read(Block& block, const Workers& workers) {
   block.first.clear();
   block.segments.clear();
   std::size_t pixel = 0;
-  for (const SegmentEntry& entry : block.entries) {
+  for (std::size_t i = 0; i < block.entries.size(); ++i) {
+    const SegmentEntry& entry = block.entries[i];
     const Tile tile{entry.x, entry.y, entry.width, entry.height};
     block.first.push_back(pixel);
-    const float* const from = (entry.own_start != 0 ? block.irradiance.data() : block.start.data()) + pixel;
-    if (entry.own_start != 0) pixel += tile.area();
+    const float* from = block.start.data() + pixel;
+    if (entry.own_start != 0) {
+      from = block.irradiance.data() + pixel;
+      pixel += tile.area();
+    } else if (block.previous[i] != kNone) {
+      from = block.segments[block.previous[i]].irradiance1.row(tile.y) + tile.x;
+    }
     const float* const to = block.irradiance.data() + pixel;
     pixel += tile.area();
     block.segments.push_back({tile, entry.t0, entry.t1, {entry.t0 == entry.t1 ? to : from, tile}, {to, tile}});
@@ -255,10 +278,10 @@ void SampleStoreReader::Impl::seek(TimeNs t) {
 
 /// Makes the next block the current one; false at the end.
 bool SampleStoreReader::Impl::next_block(const Workers& workers) {
-  if (!(reading.valid() ? reading.get() : read(ahead, workers))) return false;
-  std::swap(current, ahead);
+  const auto read_alone = [this](Block& block) { return read(block, one_thread); };
+  if (read_ahead && !blocks_ahead) blocks_ahead.emplace(read_alone, kBlocksAhead);
+  if (!(blocks_ahead ? blocks_ahead->next(current) : read(current, workers))) return false;
   next_portion = next_segment = 0;
-  if (read_ahead) reading = std::async(std::launch::async, [this] { return read(ahead, one_thread); });
   return true;
 }
 

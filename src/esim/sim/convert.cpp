@@ -117,12 +117,12 @@ class Run {
   }
 
   void deliver_events(TimeNs until) {
-    events_.clear();
-    timed(summary_.seconds.events, [&] { conversion_.event_camera.release_until(until, events_); });
-    const auto on = std::count_if(events_.begin(), events_.end(), [](const Event& e) { return e.polarity > 0; });
+    const EventSpan events =
+        timed(summary_.seconds.events, [&] { return conversion_.event_camera.release_until(until); });
+    const auto on = std::ranges::count_if(events, [](const Event& e) { return e.polarity > 0; });
     summary_.events_on += on;
-    summary_.events_off += static_cast<std::int64_t>(events_.size()) - on;
-    if (!events_.empty()) write(EventsRecord{0, events_, conversion_.event_camera.labels()});
+    summary_.events_off += static_cast<std::int64_t>(events.size()) - on;
+    if (!events.empty()) write(EventsRecord{0, events, conversion_.event_camera.labels()});
   }
 
   void write_image() {
@@ -152,7 +152,6 @@ class Run {
   Frame frame_;
   Planes between_;
   Image<float> before_, after_;  // the previous and the next irradiance
-  std::vector<Event> events_;
   std::chrono::steady_clock::time_point started_ = std::chrono::steady_clock::now();
 };
 

@@ -84,10 +84,8 @@ void Stages::make_events(CameraChannel& camera, std::span<const Segment> segment
 void Stages::release_events(CameraChannel& camera, TimeNs until) {
   if (camera.event_sensors.empty()) return;
   timed(seconds_.events, [&] {
-    for_each_sensor(camera, [&](EventSensor& sensor, const Workers&) {
-      sensor.events.clear();
-      sensor.event_camera.release_until(until, sensor.events);
-    });
+    for_each_sensor(
+        camera, [&](EventSensor& sensor, const Workers&) { sensor.events = sensor.event_camera.release_until(until); });
   });
 }
 

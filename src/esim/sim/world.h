@@ -28,7 +28,7 @@ struct EventSensor {
   EventCamera event_camera;
   int number = 0;                                 // of its records' camera in RecordingInfo::cameras
   std::optional<FlickerLabels> flicker_labels{};  // if it has labels and the light flickers
-  std::vector<Event> events{};                    // the latest ones, on their way to the sink
+  EventSpan events{};                             // the latest ones, on their way to the sink
 };
 
 /// One camera of the rig with its renderer, sampler and sensors. All sensors see the same samples.

@@ -77,7 +77,7 @@ struct SensorPreview::Impl {
     world = build_sensors(scenario, samples, options.threads, quiet);
     for (std::size_t i = 0; i < world->cameras.size(); ++i) {
       world->cameras[i].sampler =
-          i == camera ? make_stored_sampler(open_samples(sensors, i, world->workers->threads() > 1), t, *world->workers)
+          i == camera ? make_stored_sampler(open_samples(sensors, i, world->workers->threads() > 1), *world->workers, t)
                       : make_no_sampler(world->info.end);
     }
     begin = done = t;

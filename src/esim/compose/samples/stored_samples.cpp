@@ -106,13 +106,10 @@ std::unique_ptr<Sampler> make_no_sampler(TimeNs end) { return std::make_unique<N
 
 std::unique_ptr<Renderer> make_no_renderer() { return std::make_unique<NoRenderer>(); }
 
-std::unique_ptr<Sampler> make_stored_sampler(SampleStoreReader store, const Workers& workers) {
+std::unique_ptr<Sampler> make_stored_sampler(SampleStoreReader store, const Workers& workers,
+                                             std::optional<TimeNs> begin) {
   const TimeNs start = store.info().start;
-  return make_stored_sampler(std::move(store), start, workers);
-}
-
-std::unique_ptr<Sampler> make_stored_sampler(SampleStoreReader store, TimeNs begin, const Workers& workers) {
-  return std::make_unique<StoredSampler>(std::move(store), begin, workers);
+  return std::make_unique<StoredSampler>(std::move(store), begin.value_or(start), workers);
 }
 
 }  // namespace esim::inline compose

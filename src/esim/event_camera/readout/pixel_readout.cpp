@@ -155,7 +155,7 @@ void PixelReadout::resume(PixelUpdate& update) {
         together_.push_back(resuming_[end].pixel);
       const PastSegment& past = history[segment];
       packing_.origin = past.segment.t0;
-      packed_.expect(packing_, past.segment.t1 - past.segment.t0);
+      packed_.set_packing(packing_);
       update.resume(*pixels_, past, together_, packed_);
       collect();
       const std::uint32_t next = history.next(segment);
@@ -171,13 +171,11 @@ void PixelReadout::resume(PixelUpdate& update) {
 
 /// Collects the requests of resumed pixels.
 void PixelReadout::collect() {
-  for (std::size_t range = 0; range < PackedEvents::kRanges; ++range) {
-    for (const std::uint64_t packed : packed_.range(range)) {
-      Event& event = again_.emplace_back();
-      packing_.unpack(packed, event);
-      states_[index(event)] |= kWaits;
-      std::ranges::push_heap(again_, std::greater<>());
-    }
+  for (const std::uint64_t packed : packed_.events()) {
+    Event& event = again_.emplace_back();
+    packing_.unpack(packed, event);
+    states_[index(event)] |= kWaits;
+    std::ranges::push_heap(again_, std::greater<>());
   }
   packed_.clear();
   if (labels_ != nullptr) labels_->add(packed_.labels);

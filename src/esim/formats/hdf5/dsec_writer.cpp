@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <limits>
 
@@ -12,6 +14,7 @@ namespace {
 
 constexpr std::size_t kChunkEvents = 1 << 16;
 constexpr std::size_t kChunkMs = 1 << 10;
+constexpr int kNoLimit = std::numeric_limits<int>::max();
 
 std::int64_t floor_divide(std::int64_t value, std::int64_t divisor) {
   const std::int64_t quotient = value / divisor;
@@ -37,7 +40,9 @@ struct EventsHdf5Writer::Impl {
 
   void create(const RecordingInfo& info);
   void append(const EventsRecord& record);
-  void store(const Event& event);
+  void check(EventSpan events);
+  void store(EventSpan events);
+  [[noreturn]] void refuse(const Event& event, const char* reason) const;
   void write_chunk();
   void close_series();
 
@@ -105,43 +110,69 @@ void EventsHdf5Writer::Impl::create(const RecordingInfo& info) {
   file->flush();
 }
 
-void EventsHdf5Writer::Impl::append(const EventsRecord& record) {
-  const EventSpan events = record.events;
-  if (labels && record.labels.size() != events.size())
-    throw InternalError(path.string() + ": " + std::to_string(record.labels.size()) + " labels of " +
-                        std::to_string(events.size()) + " events");
-  for (std::size_t i = 0; i < events.size(); ++i) {
-    const Event& event = events[i];
-    const bool inside = (width == 0 || event.x < width) && (height == 0 || event.y < height);
-    if (event.t < last_t || event.t < origin || !inside) {
-      throw InternalError(path.string() + ": event (t, x, y) = (" + std::to_string(event.t) + " ns, " +
-                          std::to_string(event.x) + ", " + std::to_string(event.y) +
-                          ") is out of order or outside the image");
-    }
-    last_t = event.t;
-    store(event);
-    if (labels) labels->store(record.labels[i]);
-    if (fill == kChunkEvents) write_chunk();
-  }
-  if (!events.empty()) last_seen = std::max(last_seen, events.back().t);
+void EventsHdf5Writer::Impl::refuse(const Event& event, const char* reason) const {
+  throw InternalError(
+      fmt::format("{}: event (t, x, y) = ({} ns, {}, {}) {}", path.string(), event.t, event.x, event.y, reason));
 }
 
-void EventsHdf5Writer::Impl::store(const Event& event) {
-  const auto since_origin = static_cast<std::uint64_t>(event.t - origin);
-  milliseconds.add(since_origin);
-  if (narrow_t) {
-    const std::uint64_t t_us = since_origin / kNsPerUs;
-    if (t_us > std::numeric_limits<std::uint32_t>::max()) {
-      throw InternalError(path.string() + ": event at " + std::to_string(event.t) + " ns, long after the planned end");
-    }
-    t32[fill] = static_cast<std::uint32_t>(t_us);
-  } else {
-    t64[fill] = options.unit == TimeUnit::us ? since_origin / kNsPerUs : since_origin;
+/// Throws unless the events are in order and inside the image, and their times fit.
+void EventsHdf5Writer::Impl::check(EventSpan events) {
+  const int width_limit = width == 0 ? kNoLimit : width, height_limit = height == 0 ? kNoLimit : height;
+  const auto is_good = [&](TimeNs before, const Event& event) {
+    return static_cast<bool>((event.t >= before) & (event.x < width_limit) & (event.y < height_limit));
+  };
+  bool good = true;
+  TimeNs before = std::max(last_t, origin);
+  for (const Event& event : events) {
+    good &= is_good(before, event);
+    before = event.t;
   }
-  x[fill] = event.x;
-  y[fill] = event.y;
-  p[fill] = event.polarity > 0 ? 1 : 0;
-  ++fill;
+  if (!good) {
+    for (const Event& event : events) {
+      if (!is_good(std::max(last_t, origin), event)) refuse(event, "is out of order or outside the image");
+      last_t = event.t;
+    }
+  }
+  last_t = before;
+  constexpr TimeNs kLongest = TimeNs{std::numeric_limits<std::uint32_t>::max()} * kNsPerUs + kNsPerUs - 1;
+  if (narrow_t && last_t - origin > kLongest) refuse(events.back(), "is long after the planned end");
+}
+
+/// Adds events, for which there must be room, to the buffers.
+void EventsHdf5Writer::Impl::store(EventSpan events) {
+  milliseconds.add(events, origin);
+  // One loop for each column: a store to one can then not change what the others need.
+  const auto fill_column = [&](auto& column, const auto& value_of) {
+    std::ranges::transform(events, column.begin() + static_cast<std::ptrdiff_t>(fill), value_of);
+  };
+  if (narrow_t) {
+    fill_column(t32, [start = origin](const Event& event) {
+      return static_cast<std::uint32_t>(static_cast<std::uint64_t>(event.t - start) / kNsPerUs);
+    });
+  } else {
+    fill_column(t64, [start = origin, unit = static_cast<std::uint64_t>(ns_per_unit)](const Event& event) {
+      return static_cast<std::uint64_t>(event.t - start) / unit;
+    });
+  }
+  fill_column(x, [](const Event& event) { return event.x; });
+  fill_column(y, [](const Event& event) { return event.y; });
+  fill_column(p, [](const Event& event) { return static_cast<std::uint8_t>(event.polarity > 0); });
+  fill += events.size();
+}
+
+void EventsHdf5Writer::Impl::append(const EventsRecord& record) {
+  if (labels && record.labels.size() != record.events.size())
+    throw InternalError(path.string() + ": " + std::to_string(record.labels.size()) + " labels of " +
+                        std::to_string(record.events.size()) + " events");
+  for (std::size_t first = 0; first < record.events.size();) {
+    const EventsRecord part = record.part(first, std::min(record.events.size() - first, kChunkEvents - fill));
+    check(part.events);
+    store(part.events);
+    if (labels) std::ranges::for_each(part.labels, [&](const EventLabel& label) { labels->store(label); });
+    if (fill == kChunkEvents) write_chunk();
+    first += part.events.size();
+  }
+  if (!record.events.empty()) last_seen = std::max(last_seen, last_t);
 }
 
 void EventsHdf5Writer::Impl::write_chunk() {

@@ -116,7 +116,7 @@ void M3edWriter::write(const Record& record) {
                             Remedy::times_from_zero);
     }
     const std::int64_t us = event.t / kNsPerUs;
-    milliseconds_.add(static_cast<std::uint64_t>(event.t));
+    milliseconds_.add({&event, 1}, 0);
     t_.push_back(us);
     x_.push_back(event.x), y_.push_back(event.y);
     p_.push_back(event.polarity > 0 ? 1 : 0);

@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "esim/core/time.h"
+#include "esim/events/event.h"
 #include "esim/formats/hdf5/library.h"
 
 // Private to formats/hdf5.
@@ -20,10 +21,16 @@ class MillisecondIndex {
   /// The dataset to append to; must be set before anything is written.
   void open(Series series) { series_ = std::move(series); }
 
-  /// Counts an event at time t >= 0, ns; events must be in order of time.
-  void add(std::uint64_t t) {
-    if (t >= next_) complete_until(t);
-    ++events_;
+  /// Counts events, which must be in order of time and not before the origin, the time 0 of the index.
+  void add(EventSpan events, TimeNs origin) {
+    const auto since_origin = [origin](const Event& event) { return static_cast<std::uint64_t>(event.t - origin); };
+    while (!events.empty() && since_origin(events.back()) >= next_) {
+      const auto first = std::ranges::lower_bound(events, next_, {}, since_origin);
+      events_ += static_cast<std::uint64_t>(first - events.begin());
+      events = {first, events.end()};
+      complete_until(since_origin(events.front()));
+    }
+    events_ += events.size();
   }
 
   /// Adds the entries for windows up to `end`, ns, and at least those up to just after the last event.

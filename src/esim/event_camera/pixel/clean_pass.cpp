@@ -80,8 +80,21 @@ struct CleanPass::Block {
   PerPixel<std::uint32_t> origin;
 
   PerPixel<float> low, high;  // bounds while inactive
+  PerPixel<std::uint32_t> chosen;
 
   Block() { low.fill(0), high.fill(0); }
+
+  /// The indices below `count` for which predicate(i) is true. Without branches: the pixels that fire are hard to
+  /// predict.
+  template <typename Predicate>
+  std::span<const std::uint32_t> choose(std::size_t count, const Predicate& predicate) {
+    std::size_t found = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      chosen[found] = static_cast<std::uint32_t>(i);
+      found += predicate(i) ? 1 : 0;
+    }
+    return {chosen.data(), found};
+  }
 
   void gather(const PixelArray& pixels, const Segment& segment, const EventPacking& packing, int y,
               std::span<const std::uint32_t> columns);
@@ -125,8 +138,7 @@ void CleanPass::Block::gather(const PixelArray& pixels, const Segment& segment, 
 /// Ends the refractory periods that end in this segment, and excludes the pixels that stay in reset.
 void CleanPass::Block::resume(const PixelArray& pixels, const Segment& segment) {
   const double per_ns = 1.0 / static_cast<double>(segment.t1 - segment.t0);
-  for (std::size_t i = 0; i < all.count; ++i) {
-    if (all.reference[i] != kHeld) continue;
+  for (const std::uint32_t i : choose(all.count, [&](std::size_t k) { return all.reference[k] == kHeld; })) {
     const TimeNs until = pixels.until[pixel[i]];
     if (until > segment.t1) {
       all.silence(i);
@@ -140,8 +152,8 @@ void CleanPass::Block::resume(const PixelArray& pixels, const Segment& segment) 
 /// Holds in reset the pixels that fired and whose refractory period ends after the segment. `which` are the indices of
 /// `lanes` among all pixels; null: `lanes` are all pixels.
 void CleanPass::Block::hold(PixelArray& pixels, Lanes& lanes, const std::uint32_t* which, TimeNs t0, double duration) {
-  for (std::size_t i = 0; i < lanes.count; ++i) {
-    if (!(lanes.resumes[i] > duration && lanes.polarity[i] != 0)) continue;
+  const auto stays_held = [&](std::size_t i) { return (lanes.resumes[i] > duration) & (lanes.polarity[i] != 0); };
+  for (const std::uint32_t i : choose(lanes.count, stays_held)) {
     const std::size_t index = which != nullptr ? which[i] : i;
     pixels.until[pixel[index]] = t0 + static_cast<TimeNs>(lanes.resumes[i]);
     lanes.silence(i);
@@ -181,10 +193,9 @@ void CleanPass::Block::wait(PixelArray& pixels) {
 /// Copies the pixels that fire again to `rest`.
 std::size_t CleanPass::Block::take_rest() {
   std::size_t count = 0;
-  for (std::size_t i = 0; i < all.count; ++i) {
-    if (all.again[i] == 0) continue;
+  for (const std::uint32_t i : choose(all.count, [&](std::size_t k) { return all.again[k] != 0; })) {
     rest.copy(all, i, count);
-    origin[count++] = static_cast<std::uint32_t>(i);
+    origin[count++] = i;
   }
   rest.count = count;
   return count;
@@ -200,10 +211,8 @@ void CleanPass::Block::settle(PixelArray& pixels) {
   for (std::size_t i = 0; i < all.count; ++i) states[pixel[i]].reference = all.reference[i];
   pixels.set_bounds(all.count, pixel.data(), low.data(), high.data());
   if (pixels.effects.holds) {
-    for (std::size_t i = 0; i < all.count; ++i) {
-      if (all.reference[i] == kHeld) [[unlikely]]
-        pixels.empty_bounds(pixel[i]);
-    }
+    for (const std::uint32_t i : choose(all.count, [&](std::size_t k) { return all.reference[k] == kHeld; }))
+      pixels.empty_bounds(pixel[i]);
   }
   all.count = 0;
   some_held = false;

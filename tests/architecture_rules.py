@@ -37,6 +37,7 @@ LIBRARIES = {
     r"opencv2/imgproc\b.*": "opencv_imgproc",
     r"opencv2/video\b.*": "opencv_video",
     r"png\.h": "PNG::PNG",
+    r"sqlite3\.h": "SQLite::SQLite3",
     r"tbb/.*": "TBB::tbb",
     r"webp/.*": "WebP::webp",
     r"yaml-cpp/.*": "yaml-cpp",

@@ -107,7 +107,8 @@ TEST(ConvertRecording, FoldersOfEveryFormatReadBack) {
     const CopySummary there = convert_recording(recording, format, to, {}, kGoOn);
     EXPECT_FALSE(there.copied.empty()) << format.name;
     ASSERT_TRUE(std::filesystem::exists(to / "report.json")) << format.name;
-    EXPECT_EQ(format_of(to).name, format.name);
+    const Format& found = format_of(to);
+    EXPECT_TRUE(found.name == format.name || !format.recognises) << found.name;
     std::size_t records = 0;
     const auto source = open_source(to);
     while (source->next() != nullptr) ++records;

@@ -16,6 +16,9 @@
 #include "esim/formats/ros/messages/sensor_messages.h"
 #include "esim/formats/ros/rosbag/rosbag_input.h"
 #include "esim/formats/ros/rosbag/rosbag_output.h"
+#include "esim/formats/ros/rosbag2/bag_folder.h"
+#include "esim/formats/ros/rosbag2/bag_input.h"
+#include "esim/formats/ros/rosbag2/sqlite_output.h"
 #include "formats/ros_messages.h"
 #include "support/errors.h"
 #include "support/temporary_directory.h"
@@ -34,10 +37,12 @@ class RosTopics : public testing::TestWithParam<const char*> {
 
   std::unique_ptr<ros::MessageOutput> output() const {
     if (is_bag()) return std::make_unique<rosbag::RosbagOutput>(path(), ros::ChunkCodec::none);
+    if (format_.folder) return std::make_unique<rosbag2::SqliteOutput>(path());
     return std::make_unique<mcap::McapOutput>(path(), ros::ChunkCodec::none);
   }
   std::unique_ptr<ros::MessageInput> input() const {
     if (is_bag()) return std::make_unique<rosbag::RosbagInput>(path());
+    if (format_.folder) return std::make_unique<rosbag2::BagInput>(rosbag2::files_of_bag(path()));
     return std::make_unique<mcap::McapInput>(path());
   }
 
@@ -67,11 +72,12 @@ class RosTopics : public testing::TestWithParam<const char*> {
   /// Renames a message type in the file to a name of the same length.
   void rename_type(const std::string& from, const std::string& to) const {
     ASSERT_EQ(from.size(), to.size());
-    std::string bytes = test::content(path());
+    const fs::path file = format_.folder ? path() / "bag_0.db3" : path();
+    std::string bytes = test::content(file);
     ASSERT_NE(bytes.find(from), std::string::npos);
     for (std::size_t at = 0; (at = bytes.find(from, at)) != std::string::npos;) bytes.replace(at, from.size(), to);
-    if (!is_bag()) without_checksums(bytes);
-    base_.write(path().filename().string(), bytes);
+    if (format_.name == "mcap") without_checksums(bytes);
+    std::ofstream(file, std::ios::binary) << bytes;
   }
 
   /// The chunks of an MCAP file, which are records of a byte, a length, two times, a size and the checksum.
@@ -169,6 +175,7 @@ TEST_P(RosTopics, ARecordingHasEveryImageOnce) {
   const fs::path again = convert(path(), "recording", "again");
   EXPECT_EQ(std::distance(fs::directory_iterator(again / "cam0" / "images"), {}), kFrames + 1) << "and their list";
   convert(again, GetParam(), path("twice").filename().string());
+  fs::remove_all(path());
   fs::rename(path("twice"), path());
   EXPECT_EQ(counts()["/cam0/irradiance"], kFrames);
 }
@@ -270,16 +277,96 @@ TEST_P(RosTopics, NoTopicsAtAll) {
       << message;
 }
 
-INSTANTIATE_TEST_SUITE_P(Formats, RosTopics, testing::Values("rosbag", "mcap"),
+INSTANTIATE_TEST_SUITE_P(Formats, RosTopics, testing::Values("rosbag", "mcap", "rosbag2"),
                          [](const auto& test) { return std::string(test.param); });
 
-TEST(OtherBags, OfRos2AreNamed) {
-  const test::TemporaryDirectory base;
-  const fs::path sqlite = base.write("bag.db3", std::string("SQLite format 3\0 and more", 25));
-  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { open_source(sqlite); }), "ros2 bag convert"));
+/// A folder as of `ros2 bag record`, with the files that its metadata names.
+fs::path write_bag(const test::TemporaryDirectory& base, const std::string& list, const std::string& more = "") {
   fs::create_directory(base.path() / "bag");
-  base.write("bag/metadata.yaml", "rosbag2_bagfile_information:\n");
-  EXPECT_TRUE(test::contains(test::message_of<UserError>([&] { open_source(base.path() / "bag"); }), ".mcap"));
+  base.write("bag/metadata.yaml", "rosbag2_bagfile_information:\n  relative_file_paths:" + list + "\n" + more);
+  return base.path() / "bag";
+}
+
+void write_events(ros::MessageOutput& file, const std::vector<Event>& events) {
+  std::string bytes;
+  ros::MessageWriter writer(ros::Encoding::cdr, bytes);
+  writer(ros::EventArrayHead{{events.back().t, ""}, 20, 31});
+  ros::write_events(writer, events);
+  file.write("/cam0/events", MessageType::events, events.back().t, bytes);
+}
+
+TEST(Ros2Bag, FilesOfBothKindsAreReadOneAfterAnother) {
+  const test::TemporaryDirectory base;
+  const std::vector<Event> events = test::random_events(3000, 31, 20, 0, kNsPerSecond);
+  const auto part = [&](std::ptrdiff_t i) {
+    return std::vector<Event>(events.begin() + i * 1000, events.begin() + (i + 1) * 1000);
+  };
+  const fs::path bag = write_bag(base, " [bag_0.db3, second.mcap, third/bag_0.db3]");
+  for (const auto& [folder, i] : {std::pair{bag, 0}, {bag / "third", 2}}) {
+    rosbag2::SqliteOutput file(folder);
+    write_events(file, part(i));
+    file.close();
+  }
+  mcap::McapOutput second(bag / "second.mcap", ros::ChunkCodec::zstd);
+  write_events(second, part(1));
+  second.close();
+  write_bag(base, " [bag_0.db3, second.mcap, third/bag_0.db3]");  // SqliteOutput has replaced it
+  const test::ReadBack all = test::read_back(bag);
+  EXPECT_FALSE(all.problem) << *all.problem;
+  EXPECT_EQ(all.events.at(0), events);
+}
+
+TEST(Ros2Bag, ErrorsNameFileAndReason) {
+  const test::TemporaryDirectory base;
+  const auto expect_error = [](const fs::path& path, const std::string& reason) {
+    const std::string message = test::message_of<UserError>([&] { open_source(path); });
+    EXPECT_TRUE(test::contains(message, path.string()) && test::contains(message, reason)) << message;
+  };
+  expect_error(base.write("text.db3", std::string("SQLite format 3\0 and more", 25)), "not a database");
+  expect_error(base.write("empty.db3", std::string("SQLite format 3\0", 16)), "not a");
+  {
+    rosbag2::SqliteFile file(base.path() / "views.db3", rosbag2::SqliteFile::Access::create);
+    file.execute("CREATE TABLE topics(id, name, type, serialization_format); CREATE VIEW messages AS SELECT 1 AS id");
+  }
+  expect_error(base.path() / "views.db3", "tables \"topics\" and \"messages\" are missing");
+  expect_error(write_bag(base, " [bag_0.db3]"), "bag_0.db3");
+  expect_error(write_bag(base, " [../bag_0.db3]"), "outside the bag");
+  expect_error(write_bag(base, " [/etc/passwd]"), "outside the bag");
+  expect_error(write_bag(base, " []"), "it lists no files");
+  expect_error(write_bag(base, " {a: [}"), "line 2");
+  expect_error(write_bag(base, " [bag_0.db3.zstd]", "  compression_mode: FILE\n"), "compressed");
+  base.write("bag/metadata.yaml", "something: else\n");
+  expect_error(base.path() / "bag", "rosbag2_bagfile_information");
+}
+
+/// Files of programs that compress each message, of a topic that is missing, and of a message that is damaged.
+TEST(Ros2Bag, MessagesThatCannotBeRead) {
+  const test::TemporaryDirectory base;
+  const fs::path bag = base.path() / "bag", file = bag / "bag_0.db3";
+  const std::vector<Event> events = test::random_events(1000, 31, 20, 0, kNsPerSecond);
+  const auto changed = [&](const std::string& sql, const std::string& blob) {
+    rosbag2::SqliteOutput output(bag);
+    write_events(output, events);
+    output.close();
+    rosbag2::SqliteFile opened(file, rosbag2::SqliteFile::Access::create);
+    rosbag2::SqliteStatement statement(opened, sql);
+    if (!blob.empty()) statement.bind_blob(0, blob);
+    statement.step();
+  };
+  std::string bytes, packed;
+  ros::MessageWriter writer(ros::Encoding::cdr, bytes);
+  writer(ros::EventArrayHead{{events.back().t, ""}, 20, 31});
+  ros::write_events(writer, events);
+  ros::compress(ros::ChunkCodec::zstd, bytes, packed);
+  changed("UPDATE messages SET data = ?", packed);
+  EXPECT_EQ(test::read_back(bag).events.at(0), events);
+  const auto problem = [&] { return test::read_back(bag).problem.value_or("none"); };
+  changed("UPDATE messages SET data = ?", packed.substr(0, packed.size() / 2));
+  EXPECT_TRUE(test::contains(problem(), file.string() + ": message 1: ")) << problem();
+  changed("UPDATE messages SET data = ?", bytes.substr(0, bytes.size() / 2));
+  EXPECT_TRUE(test::contains(problem(), file.string() + ": message 1: ")) << problem();
+  changed("UPDATE messages SET topic_id = 7", "");
+  EXPECT_TRUE(test::contains(problem(), "message 1: its topic is unknown")) << problem();
 }
 
 }  // namespace

@@ -48,7 +48,12 @@ void write(const Format& format, const std::filesystem::path& folder) {
 
 int main(int argc, char** argv) {
   if (argc != 2) return std::fprintf(stderr, "usage: fuzz_seed FOLDER\n"), 2;
+  const std::filesystem::path all = argv[1];
   for (const esim::Format& format : esim::all_formats()) {
-    if (format.create && !format.folder) esim::write(format, std::filesystem::path(argv[1]) / format.name);
+    if (format.create && !format.folder) esim::write(format, all / format.name);
   }
+  // The file in a folder is read alone.
+  esim::write(esim::format_named("rosbag2"), all / "db3");
+  std::filesystem::rename(all / "db3" / "seed" / "bag_0.db3", all / "db3" / "events");
+  std::filesystem::remove_all(all / "db3" / "seed");
 }

@@ -1,4 +1,4 @@
-"""MCAP files: what esim writes is read by `mcap` and `rosbags`, what `mcap` writes is read by esim.
+"""Files of ROS 2: what esim writes is read by `mcap` and `rosbags`, what these write is read by esim.
 
 Run as: mcap_interop_test.py ESIM_PROGRAM
 """
@@ -17,6 +17,9 @@ from mcap.writer import CompressionType  # noqa: E402
 from mcap_ros2.decoder import DecoderFactory  # noqa: E402
 from mcap_ros2.writer import Writer as Ros2Writer  # noqa: E402
 from rosbags.highlevel import AnyReader  # noqa: E402
+from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin  # noqa: E402
+from rosbags.rosbag2 import Writer as BagWriter  # noqa: E402
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: E402
 
 EVENT_ARRAY = f"""std_msgs/Header header
 uint32 height
@@ -73,6 +76,25 @@ def write_mcap(path, events, compression):
         writer.finish()
 
 
+def write_bag(path, events, plugin, mode, version):
+    types = get_typestore(Stores.ROS2_HUMBLE)
+    types.register(get_types_from_msg("uint16 x\nuint16 y\nbuiltin_interfaces/Time ts\nbool polarity\n", "dvs_msgs/msg/Event"))
+    types.register(get_types_from_msg("std_msgs/Header header\nuint32 height\nuint32 width\ndvs_msgs/Event[] events\n",
+                                      "dvs_msgs/msg/EventArray"))
+    array, event = types.types["dvs_msgs/msg/EventArray"], types.types["dvs_msgs/msg/Event"]
+    header, stamp = types.types["std_msgs/msg/Header"], types.types["builtin_interfaces/msg/Time"]
+    writer = BagWriter(path, version=version, storage_plugin=plugin)
+    if mode is not CompressionMode.NONE:
+        writer.set_compression(mode, CompressionFormat.ZSTD)
+    with writer:
+        connection = writer.add_connection("/dvs/events", array.__msgtype__, typestore=types)
+        for begin in range(0, len(events), 1000):
+            part = events[begin:begin + 1000]
+            message = array(header(stamp(*divmod(part[-1][0], 10**9)), "dvs"), 480, 640,
+                            [event(x, y, stamp(*divmod(s, 10**9)), bool(p)) for s, x, y, p in part])
+            writer.write(connection, part[-1][0], types.serialize_cdr(message, array.__msgtype__))
+
+
 class McapInterop(InteropTest):
     def test_ours_by_mcap(self):
         events = random_events()
@@ -96,13 +118,28 @@ class McapInterop(InteropTest):
 
     def test_ours_by_rosbags(self):
         events = random_events()
-        found = []
-        with AnyReader([self.convert(self.write_events(events), "ours.mcap")]) as reader:
-            for connection, _, raw in reader.messages():
-                message = reader.deserialize(raw, connection.msgtype)
-                if connection.topic == "/cam0/events":
-                    found += [(e.ts.sec * 10**9 + e.ts.nanosec, e.x, e.y, int(e.polarity)) for e in message.events]
-        self.assertEqual(found, events)
+        for name, options in (("ours.mcap", ()), ("bag", ("--format", "rosbag2"))):
+            found = []
+            with self.subTest(name=name), AnyReader([self.convert(self.write_events(events), name, *options)]) as reader:
+                for connection, time_of_recording, raw in reader.messages():
+                    message = reader.deserialize(raw, connection.msgtype)
+                    if connection.topic == "/cam0/events":
+                        found += [(e.ts.sec * 10**9 + e.ts.nanosec, e.x, e.y, int(e.polarity)) for e in message.events]
+                        self.assertEqual(time_of_recording, found[-1][0])
+                self.assertEqual(found, events)
+                durability = {c.topic: [qos.durability.name for qos in c.ext.offered_qos_profiles] for c in reader.connections}
+                if options:
+                    self.assertEqual(durability["/tf_static"], ["TRANSIENT_LOCAL"])
+
+    def test_bags_of_rosbags(self):
+        events = random_events(5000)
+        for version in (8, 9):
+            for plugin in (StoragePlugin.SQLITE3, StoragePlugin.MCAP):
+                for mode in (CompressionMode.NONE, CompressionMode.MESSAGE):
+                    name = f"{version}_{plugin.name}_{mode.name}"
+                    with self.subTest(name=name):
+                        write_bag(self.folder / name, events, plugin, mode, version)
+                        self.assertEqual(self.read_events(self.convert(self.folder / name, f"{name}.txt")), events)
 
     def test_ours_by_core(self):
         if shutil.which("node") is None:

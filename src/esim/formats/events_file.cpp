@@ -37,6 +37,7 @@ fs::path find_any_file(const fs::path& path) {
     if (!entry->is_directory(unreadable)) continue;
     for (const std::string& sensor : sensors_in(entry->path())) cameras.push_back(entry->path() / sensor);
   }
+  if (cameras.empty() && find_format_of_others(path) != nullptr) return path;
   if (cameras.empty()) throw UserError(path.string() + ": there is no events.h5 or events.txt inside");
   if (cameras.size() == 1) return *events_file_in(cameras.front());
   std::sort(cameras.begin(), cameras.end());

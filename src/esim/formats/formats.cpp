@@ -22,6 +22,7 @@
 #include "esim/formats/recording_folder/recording_folder.h"
 #include "esim/formats/ros/mcap/mcap_format.h"
 #include "esim/formats/ros/rosbag/rosbag_format.h"
+#include "esim/formats/ros/rosbag2/rosbag2_format.h"
 #include "esim/formats/text/events_text.h"
 #include "esim/recording/checked_source.h"
 #include "esim/recording/recording_directory.h"
@@ -64,6 +65,9 @@ const std::vector<Format>& all_formats() {
       rosbag_packets_format(),
       mcap_format(),
       mcap_packets_format(),
+      rosbag2_format(),
+      rosbag2_packets_format(),
+      rosbag2_file_format(),
       dataset_format(),
       dataset_folder_format(),
       m3ed_format(),
@@ -98,17 +102,15 @@ const Format& format_of(const fs::path& path) {
   for (const Format& format : all_formats()) {
     if (format.folder == folder && format.recognises && format.recognises(path, head)) return format;
   }
-  if (head.starts_with("SQLite format 3")) {
-    throw UserError(
-        fmt::format("cannot read {}: SQLite files of ROS 2 bags are not supported; convert the bag to MCAP "
-                    "with `ros2 bag convert`",
-                    path.string()));
-  }
-  if (folder && fs::is_regular_file(path / "metadata.yaml", error)) {
-    throw UserError(fmt::format("cannot read {}: it looks like the folder of a ROS 2 bag; name the .mcap file in it",
-                                path.string()));
-  }
   throw UserError(fmt::format("cannot read {}: it is not in any of the formats {}", path.string(), names()));
+}
+
+const Format* find_format_of_others(const fs::path& folder) {
+  for (const Format& format : all_formats()) {
+    const bool fits = format.folder && format.name != "recording" && format.can_hold(Content::events);
+    if (fits && format.recognises && format.recognises(folder, "")) return &format;
+  }
+  return nullptr;
 }
 
 const Format* find_format_for(const fs::path& path) {

@@ -18,6 +18,9 @@ const Format& format_named(std::string_view name);
 /// The format of an existing file or folder. Throws UserError if the path does not exist or its content is unknown.
 const Format& format_of(const std::filesystem::path& path);
 
+/// The format of a folder with events of another program; null for other folders.
+const Format* find_format_of_others(const std::filesystem::path& folder);
+
 /// The format for writing to a path, by its extension. For unknown extensions, this returns null and format_for()
 /// throws UserError.
 const Format* find_format_for(const std::filesystem::path& path);

@@ -146,6 +146,14 @@ void list_files(const fs::path& root, const fs::path& below, std::vector<FileSiz
   }
 }
 
+/// A folder in the format of another program, if it is one with events.
+void inspect_folder_of_others(const fs::path& folder, Inspection& inspection) {
+  const Format* const format = find_format_of_others(folder);
+  if (format == nullptr) return;
+  inspection.format = format->description;
+  summarise(*open_source(folder), inspection);
+}
+
 Inspection inspect_directory(const fs::path& directory) {
   Inspection inspection;
   inspection.path = directory;
@@ -167,7 +175,8 @@ Inspection inspect_directory(const fs::path& directory) {
       if (auto summary = summarise_folder(directory / name, name)) inspection.cameras.push_back(*std::move(summary));
     }
   }
-  if (inspection.cameras.empty() && inspection.status == RecordingStatus::unknown) {
+  if (inspection.cameras.empty()) inspect_folder_of_others(directory, inspection);
+  if (inspection.cameras.empty() && inspection.format.empty() && inspection.status == RecordingStatus::unknown) {
     throw UserError(directory.string() + " is not a recording: no report.json and no events.h5 inside");
   }
   return inspection;

@@ -39,6 +39,7 @@ EventCameraOptions filtered() {
   EventCameraOptions options = dim();
   options.circuit->high_pass_hz = 0.4;
   options.circuit->leak_hz_per_klux = 300;  // in this light, three times the leak without light
+  options.circuit->frame_coupling = 0.03, options.circuit->frame_rate_hz = 30, options.circuit->frame_exposure_ms = 9;
   return options;
 }
 

@@ -29,7 +29,11 @@ void expect_coverage(std::vector<test::Coverage> all, int sensors, const Fit& fi
       for (test::Coverage& c : all) {
         if (e.name != c.name) continue;
         const double value = test::true_value(truth, e.name);
-        if (e.determined()) c.add(e, value);
+        if (e.determined()) {
+          c.add(e, value);
+          std::printf("sensor %d: %s: error %+.2f %%, half of the interval %.2f %%\n", i, c.name,
+                      100 * (e.value / value - 1), 50 * (e.high - e.low) / value);
+        }
         if (!e.determined())
           std::printf("sensor %d: %s: %s\n", i, c.name, e.reason.c_str());
         else if (value < e.low || value > e.high)

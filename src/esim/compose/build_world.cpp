@@ -86,7 +86,8 @@ void add_event_sensors(const Scenario& scenario, std::size_t index, const std::v
   for (std::size_t k = 0; k < options.sensors().size(); ++k) {
     const SensorOptions& sensor = options.sensors()[k];
     const std::string name = name_of(options, sensor);
-    const EventCameraOptions lit = in_light_of(scenario, sensor);
+    EventCameraOptions lit = in_light_of(scenario, sensor);
+    add_frames(options.frame_camera, lit);
     warn_of_noise(fmt::format("camera {}: ", name), lit, notices);
     try {
       camera.event_sensors.push_back({EventCamera(lit, model.width, model.height, sensor.seed.value_or(scenario.seed),

@@ -66,6 +66,7 @@ struct EventCamera::State {
   bool integrate_tiles(const Workers& workers);
   bool advance(std::size_t i, const Image<float>* given, Rows rows, int worker);
   void refuse_long_time(TimeNs duration) const;
+  std::span<const Segment> divide(std::span<const Segment> given);
   void subtract_surround(const Segment& segment, const Workers& workers);
 
   /// Everything except working memory and the queue.
@@ -147,6 +148,14 @@ void EventCamera::State::refuse_long_time(TimeNs duration) const {
                   " s apart; the interval must be shorter than " + std::to_string(to_seconds(longest)) + " s");
 }
 
+/// The segments as pixels with a circuit need them.
+std::span<const Segment> EventCamera::State::divide(std::span<const Segment> given) {
+  for (const Segment& segment : given) {
+    if (segment.t0 == segment.t1) circuit->set_epoch(segment.t0);
+  }
+  return circuit->divide(given);
+}
+
 /// Integrates rows of the i-th segment.
 bool EventCamera::State::advance(std::size_t i, const Image<float>* given, Rows rows, int worker) {
   const Segment& segment = segments[i];
@@ -195,10 +204,7 @@ bool EventCamera::State::integrate(const Workers& workers) {
   tile_begins.clear();
   int pixels_seen = 0;  // since the last tile_begins
   for (std::size_t i = 0; i < segments.size(); ++i) {
-    if (segments[i].t0 == segments[i].t1) {
-      pixels.set_epoch(segments[i].t0);
-      if (circuit) circuit->set_epoch(segments[i].t0);
-    }
+    if (segments[i].t0 == segments[i].t1) pixels.set_epoch(segments[i].t0);
     if (i == 0 || (segments[i].tile != segments[i - 1].tile && pixels_seen >= kPixelsPerPiece))
       tile_begins.push_back(i), pixels_seen = 0;
     pixels_seen += static_cast<int>(segments[i].tile.area());
@@ -223,10 +229,12 @@ void EventCamera::integrate(std::span<const Segment> segments, TimeNs watermark,
   state.packing.origin = first;
   state.refuse_long_time(last - first);
   for (PackedEvents& events : state.events) events.set_packing(state.packing);
+  if (state.circuit) segments = state.divide(segments);
   state.segments = segments;
   if (state.readout) state.readout->history.add(segments, state.pixels);
   if (state.circuit_readout) {
-    state.circuit_readout->history.add(segments, state.size.width, state.size.height, state.circuit->front_values());
+    state.circuit_readout->history.add(state.segments, state.size.width, state.size.height,
+                                       state.circuit->front_values());
   }
   if (!state.integrate(workers)) {
     state.spoiled = true;

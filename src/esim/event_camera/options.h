@@ -78,6 +78,9 @@ struct CircuitOptions {
   double high_pass_hz = 0.0;
   double leak_hz_per_klux = 0.0;
   double noise = 1.0;
+  double frame_coupling = 0.0;
+  std::optional<double> frame_rate_hz{};      ///< unset: no frames
+  std::optional<double> frame_exposure_ms{};  ///< unset: no frames
 
   double threshold_mismatch_common = 0.0;
   double noise_mismatch_decades = 0.0;
@@ -98,6 +101,8 @@ struct CircuitOptions {
   /// The time constants of the photodiode at a photocurrent, dark current included, and of the source follower, s.
   double photodiode_s(double current_fa) const { return photodiode_charge_e * kElementaryCharge_fC / current_fa; }
   double source_follower_s() const { return 1 / (2 * std::numbers::pi * source_follower_hz); }
+  /// Whether frames disturb the pixels.
+  bool has_frames() const { return frame_coupling != 0 && frame_rate_hz && frame_exposure_ms; }
   /// The dark current in units of the irradiance: L = ln(E + this), plus a constant.
   double dark_irradiance() const { return dark_current_fa / white_photocurrent_fa(); }
 };
@@ -217,6 +222,12 @@ void describe(Visitor& visit, CircuitOptions& o) {
   visit("leak_hz_per_klux", o.leak_hz_per_klux,
         About{"leak that light adds to leak_rate_hz, per 1000 lux on the sensor", "Hz", 0, 1e6});
   visit("noise", o.noise, About{"factor on the standard deviation of the noise; 0: no noise", "", 0, 10});
+  visit("frame_coupling", o.frame_coupling,
+        About{"what the exposure of frames on the same chip subtracts from the comparators' input", "", -1, 1});
+  visit("frame_rate_hz", o.frame_rate_hz,
+        About{"rate of these frames (default: that of frame_camera; without one, there are none)", "Hz", 0.01, 1e4});
+  visit("frame_exposure_ms", o.frame_exposure_ms,
+        About{"their exposure (default: exposure_s of frame_camera)", "ms", 0.2, 1e5});
   visit("threshold_mismatch_common", o.threshold_mismatch_common,
         About{"relative standard deviation, from pixel to pixel, that both thresholds share", "", 0, 1});
   visit("noise_mismatch_decades", o.noise_mismatch_decades,

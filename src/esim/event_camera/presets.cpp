@@ -73,6 +73,7 @@ EventCameraOptions davis240c_by_circuit() {
   o.threshold_ratio = 0.87;
   o.threshold_mismatch = 0.02;
   o.circuit->threshold_mismatch_common = 0.07;
+  o.circuit->frame_coupling = 0.03;
   o.refractory_period_us = 1450;
   o.leak_rate_hz = 0.02;
   o.readout.rate_mev_per_s = 10;

@@ -340,6 +340,13 @@ EventCameraOptions in_light_of(const Scenario& scenario, const EventCameraOption
   return options;
 }
 
+void add_frames(const std::optional<FrameCameraOptions>& frames, EventCameraOptions& sensor) {
+  if (!sensor.circuit || !frames) return;
+  CircuitOptions& circuit = *sensor.circuit;
+  if (!circuit.frame_rate_hz) circuit.frame_rate_hz = frames->rate_hz;
+  if (!circuit.frame_exposure_ms) circuit.frame_exposure_ms = 1e3 * frames->exposure_s;
+}
+
 Camera camera_model(const CameraOptions& options) {
   constexpr double kDefaultFov_deg = 75;
   const double fov_deg = options.horizontal_fov_deg.value_or(kDefaultFov_deg);

@@ -76,6 +76,10 @@ std::string scenario_reference();
 /// The options of an event sensor, in the light of the scenario unless the sensor has its own white_lux.
 EventCameraOptions in_light_of(const Scenario& scenario, const EventCameraOptions& sensor);
 
+/// Gives an event sensor the frames of the camera that shares its chip, unless it has its own frame_rate_hz or
+/// frame_exposure_ms.
+void add_frames(const std::optional<FrameCameraOptions>& frames, EventCameraOptions& sensor);
+
 /// The geometry that `options` describe. Throws UserError if it is impossible.
 Camera camera_model(const CameraOptions& options);
 

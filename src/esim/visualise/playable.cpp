@@ -15,7 +15,7 @@ namespace fs = std::filesystem;
 
 bool is_format(const fs::path& folder) {
   for (const Format& format : all_formats()) {
-    if (format.folder && format.recognises(folder, "")) return true;
+    if (format.folder && format.recognises && format.recognises(folder, "")) return true;
   }
   return false;
 }

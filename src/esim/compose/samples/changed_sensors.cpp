@@ -153,6 +153,8 @@ Scenario sensors_only(const Scenario& scenario) {
   for (CameraOptions& camera : sensors.cameras) {
     camera.sampling = FlowSampling{};
     camera.colour = ColourFilters::none;
+    add_frames(camera.frame_camera, camera.event_camera);
+    for (SensorOptions& sensor : camera.event_cameras) add_frames(camera.frame_camera, sensor);
     camera.frame_camera.reset();
   }
   return sensors;

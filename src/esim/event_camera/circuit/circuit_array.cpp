@@ -24,7 +24,7 @@ constexpr double kPerLight = 4096;
 
 CircuitArray::CircuitArray(const EventCameraOptions& options, int width, int height, std::uint64_t seed,
                            std::uint16_t stream)
-    : width_(width), height_(height), starts_(seed, Purpose::circuit_start, stream) {
+    : width_(width), height_(height), starts_(seed, Purpose::circuit_start, stream), coupling_(*options.circuit) {
   const CircuitOptions& o = *options.circuit;
   const double white_fa = o.white_photocurrent_fa();
   dark_ = o.dark_current_fa / white_fa;
@@ -179,6 +179,8 @@ HWY_INLINE void CircuitArray::move_vector(D d, const Row& row, std::size_t x, Ci
   V light_sum = hn::Zero(d);
   const V leak = hn::Mul(hn::PromoteTo(d, hn::LoadU(df, &leak_[i])), set(1e-9));
   V leaked0 = hn::Mul(leak, set(row.start)), leaked1 = hn::Mul(leak, set(row.start + row.length));
+  leaked0 = hn::Add(leaked0, set(row.coupled.value));
+  leaked1 = hn::Add(leaked1, set(row.coupled.value + row.coupled.slope * row.length));
   if (!light_leak_.empty()) {
     const V light_leak = hn::Mul(hn::PromoteTo(d, hn::LoadU(df, &light_leak_[i])), set(0.5e-9 / kPerLight));
     const V rounded = hn::Round(hn::Mul(hn::Sub(hn::Sub(hn::Add(e0, e1), dark), dark), set(kPerLight)));
@@ -279,6 +281,7 @@ void CircuitArray::resume(std::uint32_t pixel, const PastSegment& past, CircuitB
                 segment.t0,
                 static_cast<double>(segment.t0 - epoch_),
                 static_cast<double>(segment.t1 - segment.t0),
+                coupled_from(segment.t0),
                 EventPacking(width_, height_)};
   std::array<double, 6> present{};
   std::size_t used = 0;
@@ -331,6 +334,7 @@ bool CircuitArray::advance(const Segment& segment, Rows rows, CircuitBuffer& buf
                   segment.t0,
                   static_cast<double>(segment.t0 - epoch_),
                   static_cast<double>(segment.t1 - segment.t0),
+                  coupled_from(segment.t0),
                   events.packing()};
     if (past != nullptr) {
       std::size_t used = 0;

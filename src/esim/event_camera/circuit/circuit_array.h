@@ -12,6 +12,7 @@
 #include "esim/core/time.h"
 #include "esim/event_camera/circuit/circuit_lanes.h"
 #include "esim/event_camera/circuit/circuit_pixel.h"
+#include "esim/event_camera/circuit/frame_coupling.h"
 #include "esim/event_camera/options.h"
 #include "esim/event_camera/segment_history.h"
 #include "esim/events/packed_events.h"
@@ -74,6 +75,11 @@ class CircuitArray {
   /// Whether each pixel is hot; only with labels.
   const std::vector<bool>& hot() const { return hot_; }
 
+  /// Divides segments so that the coupling of frames is linear within each; valid until the next call.
+  std::span<const Segment> divide(std::span<const Segment> segments) {
+    return coupling_.active() ? divider_.divide(segments, coupling_, epoch_) : segments;
+  }
+
   void set_epoch(TimeNs t) {
     if (epoch_ == kNoEpoch) epoch_ = t;
   }
@@ -101,6 +107,7 @@ class CircuitArray {
     std::size_t count;
     TimeNs t0;
     double start, length;  // ns after the epoch; ns
+    Ramp coupled;          // of frames
     EventPacking packing;
   };
 
@@ -123,6 +130,9 @@ class CircuitArray {
   void set_bounds(std::size_t pixel, const CircuitBounds& bounds);
   CircuitPixel pixel(std::size_t i, KnownPath& known);
   LeakRamp leak(std::size_t i, double light_rate, double start) const;
+  Ramp coupled_from(TimeNs t) const {
+    return coupling_.active() ? coupling_.at(static_cast<double>(t - epoch_)) : Ramp();
+  }
   void keep(std::size_t i, std::size_t at, const CircuitBuffer& buffer);
   void label(std::size_t i, TimeNs t, int polarity, std::vector<NewLabel>& labels) const;
   static void flush(const Row& row, CircuitBuffer& buffer, PackedEvents& events);
@@ -133,6 +143,8 @@ class CircuitArray {
   double dark_ = 0;      // L = ln(E + dark)
   bool limits_ = false;  // there is a maximum rate of events of a pixel
   TimeNs epoch_ = kNoEpoch;
+  FrameCoupling coupling_;
+  CornerDivider divider_;
 
   // Per pixel.
   LargeVector<CircuitParameters> parameters_;

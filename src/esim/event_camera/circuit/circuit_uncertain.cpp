@@ -30,10 +30,13 @@ void CircuitArray::label(std::size_t i, TimeNs t, int polarity, std::vector<NewL
                     {}});
 }
 
-/// The leak of the pixel of a column during the segment.
+/// What leak and frames add to the input of the comparators of the pixel of a column during the segment.
 LeakRamp CircuitArray::leak_in(const Row& row, std::size_t column, std::size_t at, const CircuitBuffer& buffer) const {
   const std::size_t i = row.first + column;
-  return leak(i, light_leak_.empty() ? 0.0 : (buffer.light_sum[at] - light_sum_[i]) / row.length, row.start);
+  LeakRamp all = leak(i, light_leak_.empty() ? 0.0 : (buffer.light_sum[at] - light_sum_[i]) / row.length, row.start);
+  all.leaked += row.coupled.value;
+  all.rate += row.coupled.slope;
+  return all;
 }
 
 /// Takes the pixel of a column to the segment's end, from where its lane is in its piece, which begins `done` ns after

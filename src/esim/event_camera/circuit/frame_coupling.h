@@ -1,0 +1,60 @@
+#pragma once
+
+#include <deque>
+#include <span>
+#include <vector>
+
+#include "esim/core/image.h"
+#include "esim/event_camera/options.h"
+#include "esim/render/sample.h"
+
+// Private to event_camera.
+namespace esim::inline event_camera {
+
+/// A linear function of time: value + slope s, s in ns after a start.
+struct Ramp {
+  double value = 0, slope = 0;
+};
+
+/// What frames that the chip exposes beside the events add to the input of all comparators: -frame_coupling during each
+/// exposure, which it reaches within 200 us and leaves within 10 us. Frame k, from 1 on, is centred on k /
+/// frame_rate_hz after the epoch, as those of a frame camera.
+class FrameCoupling {
+ public:
+  static constexpr TimeNs kFall = 200 * kNsPerUs, kRise = 10 * kNsPerUs;
+
+  explicit FrameCoupling(const CircuitOptions& options) {
+    if (!options.has_frames()) return;
+    coupling_ = options.frame_coupling;
+    period_ = 1e9 / *options.frame_rate_hz;
+    exposure_ = static_cast<TimeNs>(1e6 * *options.frame_exposure_ms);
+  }
+
+  bool active() const { return coupling_ != 0; }
+
+  /// The function from t (ns after the epoch) to the next corner.
+  Ramp at(double t) const;
+
+  /// The first corner after t, where the slope changes, in ns after the epoch.
+  TimeNs next_corner(TimeNs t) const;
+
+ private:
+  /// The start of an exposure.
+  TimeNs start(double frame) const { return static_cast<TimeNs>(frame * period_) - exposure_ / 2; }
+
+  double coupling_ = 0, period_ = 0;
+  TimeNs exposure_ = 0;
+};
+
+/// Divides segments at the corners of the coupling, by interpolating the irradiance.
+class CornerDivider {
+ public:
+  /// The divided segments; valid until the next call, as long as the irradiance of `segments`.
+  std::span<const Segment> divide(std::span<const Segment> segments, const FrameCoupling& coupling, TimeNs epoch);
+
+ private:
+  std::vector<Segment> divided_;
+  std::deque<Image<float>> images_;  // irradiance at the corners
+};
+
+}  // namespace esim::inline event_camera

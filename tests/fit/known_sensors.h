@@ -93,7 +93,7 @@ inline ContrastFit::Result fit_waves(const EventCameraOptions& sensor, double re
 struct Coverage {
   const char* name;
   int inside = 0, sensors = 0;
-  double widths = 0, squares = 0, worst = 0;
+  double widths = 0, squares = 0, worst = 0, deviations = 0;
 
   void add(const Estimate& e, double truth) {
     ++sensors;
@@ -105,9 +105,13 @@ struct Coverage {
     widths += (e.high - e.low) / truth;
     const double error = (e.value - truth) / truth;
     squares += error * error, worst = std::max(worst, std::abs(error));
+    deviations += std::pow((e.value - truth) / ((e.high - e.low) / (2 * 1.96)), 2);
   }
   /// Mean width of the intervals over the one that the scatter of the values implies.
   double relative_width() const { return widths / sensors / (2 * 1.96 * std::sqrt(squares / sensors)); }
+  /// The same if each sensor has errors of its own size: the standard deviations that the intervals state, over the
+  /// errors.
+  double stated_over_found() const { return 1 / std::sqrt(deviations / sensors); }
 };
 
 /// A minute of constant light with leak, ten seconds of noise, and five of waves.

@@ -43,15 +43,15 @@ void expect_coverage(std::vector<test::Coverage> all, int sensors, const Fit& fi
     });
     std::printf("after %d sensors\n", i + 1);
     for (const test::Coverage& c : all)
-      std::printf("  %-32s %d of %d, width %.2f, worst %.4f\n", c.name, c.inside, c.sensors, c.relative_width(),
-                  c.worst);
+      std::printf("  %-32s %d of %d, width %.2f, stated over found %.2f, worst %.4f\n", c.name, c.inside, c.sensors,
+                  c.relative_width(), c.stated_over_found(), c.worst);
     std::fflush(stdout);
   }
   for (const test::Coverage& c : all) {
     EXPECT_GE(c.sensors, sensors / 2) << c.name;
     // Binomial: 95 % and 3 standard deviations.
     EXPECT_GE(c.inside, 0.95 * c.sensors - 3 * std::sqrt(0.95 * 0.05 * c.sensors)) << c.name;
-    EXPECT_LE(c.relative_width(), 3) << c.name;
+    EXPECT_LE(c.stated_over_found(), 2) << c.name;
   }
 }
 

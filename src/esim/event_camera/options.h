@@ -225,7 +225,7 @@ void describe(Visitor& visit, CircuitOptions& o) {
   visit("frame_coupling", o.frame_coupling,
         About{"what the exposure of frames on the same chip subtracts from the comparators' input", "", -1, 1});
   visit("frame_rate_hz", o.frame_rate_hz,
-        About{"rate of these frames (default: that of frame_camera; without one, there are none)", "Hz", 0.01, 1e4});
+        About{"rate of these frames (default: that of frame_camera; without one: no frames)", "Hz", 0.01, 1e4});
   visit("frame_exposure_ms", o.frame_exposure_ms,
         About{"their exposure (default: exposure_s of frame_camera)", "ms", 0.2, 1e5});
   visit("threshold_mismatch_common", o.threshold_mismatch_common,

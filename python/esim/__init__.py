@@ -23,7 +23,7 @@ from ._represent import (
     voxel_grid,
 )
 from ._scenario import Scenario
-from ._simulate import CameraPacket, Packet, Renderer, Report, Simulation, simulate
+from ._simulate import CameraPacket, LiveSimulation, Packet, Renderer, Report, Simulation, simulate, simulate_live
 from ._trajectory import Trajectory
 from ._types import CAUSES, EVENT_DTYPE, IMU_DTYPE, LABEL_DTYPE, STATE_DTYPE
 from .interpolators._video import video
@@ -41,6 +41,7 @@ __all__ = [
     "Events",
     "EventsIterator",
     "InternalError",
+    "LiveSimulation",
     "OutputError",
     "Packet",
     "Recording",
@@ -62,6 +63,7 @@ __all__ = [
     "play",
     "save_events",
     "simulate",
+    "simulate_live",
     "space_time_plot",
     "time_surface",
     "time_surface_picture",

@@ -162,6 +162,36 @@ def simulate(
     cache_bytes: Int = 10_000_000_000,
 ) -> Simulation: ...
 
+class LiveSimulation:
+    start: int
+    end: int
+    cameras: dict[str, dict[str, Any]]
+    objects: list[str]
+    pose_t: int
+    latency: int
+    def step(self, T_world_body: ArrayLike) -> list[Packet]: ...
+    def close(self) -> None: ...
+    @property
+    def report(self) -> Report | None: ...
+    def __enter__(self) -> LiveSimulation: ...
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None: ...
+
+def simulate_live(
+    scenario: Path | Mapping[str, Any] | Scenario,
+    T_world_body: ArrayLike,
+    *,
+    interval_s: Number = 0.005,
+    smooth: bool = False,
+    overrides: Mapping[str, Any] | Iterable[str] | None = None,
+    threads: Int = 0,
+    seed: Int | None = None,
+    out: Path | None = None,
+    force: bool = False,
+    packet_s: Number | None = None,
+) -> LiveSimulation: ...
+
 class EventsIterator(Iterator[Events]):
     def __init__(
         self,

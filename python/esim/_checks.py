@@ -265,6 +265,14 @@ def labels(image, name, shape, count):
     return np.ascontiguousarray(image, np.uint16)
 
 
+def pose(value, name):
+    """A rigid transformation as a matrix."""
+    matrix = np.ascontiguousarray(value, np.float64)
+    if matrix.shape != (4, 4):
+        raise Error(f"{name} must have shape (4, 4), not {matrix.shape}")
+    return matrix
+
+
 def picture(image):
     """An sRGB image, uint8 or uint16, grey or with three colours."""
     image = np.asarray(image)

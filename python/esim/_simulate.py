@@ -221,22 +221,8 @@ class Report(dict):
         return self["notices"]
 
 
-class Simulation:
-    """A running simulation: an iterator over its packets. Made by `simulate`.
-
-    Also a context manager, which ends it: a recording is then finished and marked as interrupted. If events were lost,
-    the end raises a `LossWarning`.
-
-    Attributes
-    ----------
-    start, end : int
-        The simulated time, ns.
-    cameras : dict of str to dict
-        By camera name, `width` and `height` (px), `K` (3, 3, px, without distortion), `T_body_camera` (4, 4) and
-        `sensors`: the names of its event sensors, if it has several.
-    objects : list of str
-        Names of the moving objects, in the order of their numbers.
-    """
+class _Running:
+    """A simulation that has begun."""
 
     def __init__(self, core):
         self._core = core
@@ -249,32 +235,6 @@ class Simulation:
         self.start, self.end = info["start"], info["end"]
         self.cameras = info["cameras"]
         self.objects = info["objects"]
-
-    def __iter__(self):
-        return self
-
-    def __next__(self):
-        if not self._made:
-            self._core.append_next(self._made)
-        if self._made[0] is None:
-            self._warn_of_losses()
-            raise StopIteration
-        packet = Packet(self._made[0], self.cameras)
-        del self._made[0]  # Python does not look for signals from here to the return
-        return packet
-
-    def run(self):
-        """Simulates to the end without returning packets; a recording is written if `out` is given.
-
-        Returns
-        -------
-        Report
-        """
-        while self._made != [None]:
-            self._made.clear()
-            self._core.append_next(self._made)
-        self._warn_of_losses()
-        return self.report
 
     def close(self):
         """Ends the simulation at the current time."""
@@ -304,6 +264,104 @@ class Simulation:
     def __exit__(self, *_):
         self._core.close()
         self._warn_of_losses()
+
+
+class Simulation(_Running):
+    """A running simulation: an iterator over its packets. Made by `simulate`.
+
+    Also a context manager, which ends it: a recording is then finished and marked as interrupted. If events were lost,
+    the end raises a `LossWarning`.
+
+    Attributes
+    ----------
+    start, end : int
+        The simulated time, ns.
+    cameras : dict of str to dict
+        By camera name, `width` and `height` (px), `K` (3, 3, px, without distortion), `T_body_camera` (4, 4) and
+        `sensors`: the names of its event sensors, if it has several.
+    objects : list of str
+        Names of the moving objects, in the order of their numbers.
+    """
+
+    def __iter__(self):
+        return self
+
+    def __next__(self):
+        if not self._made:
+            self._core.append_next(self._made)
+        if self._made[0] is None:
+            self._warn_of_losses()
+            raise StopIteration
+        packet = Packet(self._made[0], self.cameras)
+        del self._made[0]  # Python does not look for signals from here to the return
+        return packet
+
+    def run(self):
+        """Simulates to the end without returning packets; a recording is written if `out` is given.
+
+        Returns
+        -------
+        Report
+        """
+        while self._made != [None]:
+            self._made.clear()
+            self._core.append_next(self._made)
+        self._warn_of_losses()
+        return self.report
+
+
+class LiveSimulation(_Running):
+    """A simulation whose body moves as a program says, step by step. Made by `simulate_live`.
+
+    Also a context manager, which ends it, as a `Simulation`.
+
+    Attributes
+    ----------
+    start, end, cameras, objects
+        As of `Simulation`.
+    pose_t : int
+        The time of the next pose, ns. Before the first one, the body rests for `latency`.
+    latency : int
+        The motion is known up to this time before the last pose, ns: one interval, or two if `smooth`. Events are known
+        up to a sample later: less than 1 / `min_rate_hz` of the scenario's sampling.
+    """
+
+    def __init__(self, core, interval, latency):
+        super().__init__(core)
+        self._interval = interval
+        self._packets = []  # that have not been returned: after a signal
+        self.latency = latency
+        self.pose_t = self.start + latency + interval
+
+    def step(self, T_world_body):
+        """Moves the body to its pose at `pose_t`, and simulates up to `latency` before it.
+
+        Parameters
+        ----------
+        T_world_body : array_like, shape (4, 4)
+
+        Returns
+        -------
+        list of Packet
+            The packets that are complete by now: none, one, or several. After the end of the simulation, the last ones.
+
+        Raises
+        ------
+        esim.Error
+            If the pose is not a rigid motion, or rotated by 180 degrees or more from the last one: the body then stays
+            where it is. After the end.
+        """
+        self._core.push(_checks.pose(T_world_body, "T_world_body"))
+        self.pose_t += self._interval
+        while True:
+            self._core.append_next(self._made)
+            made = self._made.pop()
+            if made is None:
+                break
+            self._packets.append(Packet(made, self.cameras))
+        self._warn_of_losses()
+        packets, self._packets = self._packets, []
+        return packets
 
 
 def simulate(
@@ -392,3 +450,66 @@ def simulate(
             ),
         )
     )
+
+
+def simulate_live(
+    scenario,
+    T_world_body,
+    *,
+    interval_s=0.005,
+    smooth=False,
+    overrides=None,
+    threads=0,
+    seed=None,
+    out=None,
+    force=False,
+    packet_s=None,
+):
+    """Begins a simulation whose body moves as a program says: a robot, an agent, a person with a controller.
+
+    The motion is a spline that passes near the poses: it misses them by about interval_s^2 / 6 times the acceleration.
+
+    Parameters
+    ----------
+    scenario : path, dict or Scenario
+        A YAML file, or its contents as a dict, with `duration_s`. Its trajectory is not used, and may be missing.
+    T_world_body : array_like, shape (4, 4)
+        The pose at the start.
+    interval_s : float
+        Time between two poses, s.
+    smooth : bool
+        Poses become a spline of order 6 instead of 4, whose acceleration is smooth, for an IMU. Adds an interval of latency.
+    overrides, threads, seed, out, force
+        As of `simulate`.
+    packet_s : float, optional
+        Length of packets, s. Default: interval_s.
+
+    Returns
+    -------
+    LiveSimulation
+        Its `step` takes the poses, and returns packets.
+
+    Raises
+    ------
+    esim.Error
+        For problems of the scenario or the pose, with the key and the valid values.
+    """
+    interval_s = _checks.number(interval_s, "interval_s", low=1e-6, high=10)
+    scenario = to_scenario(scenario)
+    seeded = [] if seed is None else [f"seed={_checks.seed(seed)}"]
+    values = scenario._read(to_overrides(overrides) + seeded, True, False)
+    interval = round(interval_s * 1e9)
+    order = 6 if _checks.flag(smooth, "smooth") else 4
+    core = _core.Simulation.live(
+        values,
+        _checks.pose(T_world_body, "T_world_body"),
+        interval,
+        order,
+        "# A program moved the body: the entry trajectory was not used.\n",
+        _checks.threads(threads),
+        _checks.packet_length(interval_s if packet_s is None else packet_s),
+        "" if out is None else os.fspath(out),
+        _checks.flag(force, "force"),
+        "a program moved the body",
+    )
+    return LiveSimulation(core, interval, (order // 2 - 1) * interval)

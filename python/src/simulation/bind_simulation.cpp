@@ -2,6 +2,7 @@
 #include <nanobind/stl/optional.h>
 #include <nanobind/stl/pair.h>
 #include <nanobind/stl/string.h>
+#include <nanobind/stl/unique_ptr.h>
 #include <nanobind/stl/vector.h>
 
 #include "bindings.h"
@@ -32,6 +33,22 @@ void make_simulation(Simulation* self, const CheckedScenario& scenario, const st
   for (const auto& [name, trajectory] : objects) substitutes.objects.push_back({name, trajectory.motion});
   new (self) Simulation(scenario.value, substitutes, function, origin,
                         {threads, packet, out, force, {command, obstacle}, images});
+}
+
+using Matrix = nb::ndarray<const double, nb::shape<4, 4>, nb::c_contig, nb::device::cpu>;
+
+SE3 pose_of(const Matrix& matrix) {
+  return SE3::from_matrix(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix.data()));
+}
+
+/// A simulation whose body moves as push() says, from a pose at the start.
+std::unique_ptr<Simulation> make_live(const CheckedScenario& scenario, const Matrix& start, TimeNs interval, int order,
+                                      const std::string& origin, int threads, TimeNs packet,
+                                      const std::filesystem::path& out, bool force, const std::string& obstacle) {
+  SimulationOptions options{threads, packet, out, force, {"", obstacle}};
+  options.live =
+      std::make_shared<OnlineTrajectory>(OnlineMotionOptions{.interval = interval, .order = order}, pose_of(start));
+  return std::make_unique<Simulation>(scenario.value, Substitutes{}, std::nullopt, origin, options);
 }
 
 // A renderer often refers to the owner of the simulation: the garbage collector must be able to traverse this cycle.
@@ -72,6 +89,10 @@ void bind_simulation(nb::module_& module) {
              std::optional<Packet> packet = self.next();
              to.append(packet ? nb::object(to_dict(std::move(*packet), self.info())) : nb::none());
            })
+      .def_static("live", &make_live, nb::arg("scenario"), nb::arg("start"), nb::arg("interval"), nb::arg("order"),
+                  nb::arg("origin"), nb::arg("threads"), nb::arg("packet"), nb::arg("out"), nb::arg("force"),
+                  nb::arg("obstacle"))
+      .def("push", [](Simulation& self, const Matrix& pose) { self.push(pose_of(pose)); })
       .def("close", &Simulation::close)
       .def("info", [](const Simulation& self) { return to_dict(self.info()); })
       .def("warnings", &Simulation::warnings)

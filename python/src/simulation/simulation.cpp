@@ -82,8 +82,13 @@ void Simulation::build(const Substitutes& substitutes, const std::string& origin
     provenance_->add(scenario_.files);
     listener.emplace([this](const UsedFile& file) { provenance_->add(file); });
   }
-  if (!substitutes.make_renderer) cache_ = open_image_cache(options.images, scenario_.renderer, notices.warning);
-  world_ = std::make_unique<World>(build_world(scenario_, substitutes, options.threads, notices, cache_));
+  live_ = options.live;
+  if (live_ != nullptr) {
+    world_ = std::make_unique<World>(build_world(scenario_, live_, options.threads, notices));
+  } else {
+    if (!substitutes.make_renderer) cache_ = open_image_cache(options.images, scenario_.renderer, notices.warning);
+    world_ = std::make_unique<World>(build_world(scenario_, substitutes, options.threads, notices, cache_));
+  }
   packets_ = std::make_unique<PacketSink>(packet_clock(*world_, options.packet));
   if (directory_ != nullptr) {
     write_file_atomically(directory_->path() / "scenario.yaml", origin + write_scenario(scenario_));
@@ -102,9 +107,15 @@ bool Simulation::signal_came() {
   return true;
 }
 
-/// Simulates until there is a packet or the end; false if a signal came first.
+void Simulation::push(const SE3& T_world_body) {
+  if (over_) throw UserError("the simulation has ended");
+  live_->push(T_world_body);
+}
+
+/// Simulates until there is a packet, the end, or the last known pose; false if a signal came first.
 bool Simulation::advance() {
-  const bool at_end = simulator_->advance_until(world_->info.end, [this](const Progress& progress) {
+  const bool reaches_end = live_ == nullptr || live_->final_until() >= world_->info.end;
+  const bool all = simulator_->advance_until(world_->info.end, [this](const Progress& progress) {
     packets_->know(progress.now);
     recorded_ |= progress.now > progress.start;
     if (progress.wall_seconds - looked_at_ >= kSignalInterval_s) {
@@ -113,7 +124,7 @@ bool Simulation::advance() {
     }
     return !packets_->has_packet();
   });
-  if (at_end) finish();
+  if (all && reaches_end) finish();
   return !signal_;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "esim/compose/compose.h"
+#include "esim/motion/online.h"
 #include "esim/recording/recording_directory.h"
 #include "events/packet_sink.h"
 #include "simulation/python_renderer.h"
@@ -23,6 +24,7 @@ struct SimulationOptions {
   bool force = false;         ///< replace an existing recording
   Repetition repetition{};    ///< for the report of the recording
   ImageCacheOptions images{};
+  std::shared_ptr<OnlineTrajectory> live{};  ///< the motion of the body, if it becomes known during the simulation
 };
 
 /// A simulation packet by packet. Callers hold the GIL, which is released during the simulation.
@@ -33,8 +35,11 @@ class Simulation {
              const std::string& origin, const SimulationOptions& options);
   ~Simulation();
 
-  /// The next packet; empty after the last. Throws the Python exception of a signal handler or a renderer; after a
-  /// signal, the simulation can continue.
+  /// Adds the next pose of the body of a live simulation.
+  void push(const SE3& T_world_body);
+
+  /// The next packet; empty after the last, and in live simulations also before later poses are known. Throws the
+  /// Python exception of a signal handler or a renderer; after a signal, the simulation can continue.
   std::optional<Packet> next();
 
   /// Ends the simulation and the recording at the current time.
@@ -68,6 +73,7 @@ class Simulation {
   std::unique_ptr<RecordingDirectory> directory_;
   std::unique_ptr<ProvenanceRecorder> provenance_;  // of the recording
   std::shared_ptr<ImageCache> cache_;
+  std::shared_ptr<OnlineTrajectory> live_;
   std::unique_ptr<World> world_;
   std::unique_ptr<PacketSink> packets_;
   std::unique_ptr<Sink> recorder_, sink_;

@@ -1,0 +1,86 @@
+import numpy as np
+import pytest
+
+import esim
+
+gymnasium = pytest.importorskip("gymnasium")
+from gymnasium.utils.env_checker import check_env  # noqa: E402
+
+import esim.gym  # noqa: E402
+
+START = np.eye(4)
+START[:3, :3] = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]  # looks along x, at the plane of `poster`
+
+
+def make(poster, **options):
+    return esim.gym.EventEnv(poster, START, **{"overrides": {"duration_s": 0.1, "sampling": {"type": "flow", "min_rate_hz": 200}}, **options})
+
+
+def episode(env, seed, action):
+    """All observations, and the last results of step()."""
+    image, info = env.reset(seed=seed)
+    images, over = [image], False
+    while not over:
+        image, reward, terminated, truncated, info = env.step(action)
+        images.append(image)
+        over = terminated or truncated
+    return np.array(images), (reward, terminated, truncated, info)
+
+
+@pytest.mark.parametrize("observation", ["voxels", "counts"])
+def test_the_checker_passes(poster, observation):
+    check_env(make(poster, observation=observation), skip_render_check=True)
+
+
+def test_it_is_registered(poster):
+    env = gymnasium.make("esim/Events-v0", scenario=poster, start=START)
+    assert env.reset(seed=1)[0].shape == (5, 30, 40)
+
+
+def test_motion_makes_events_and_rest_makes_none(poster):
+    still, _ = episode(make(poster), 1, np.zeros(6))
+    assert not still.any()
+    moving, (_, terminated, truncated, info) = episode(make(poster, observation="counts"), 1, [1, 0, 0, 0, 0, 0])
+    assert len(moving) == 11 and moving.sum() > 500 and truncated and not terminated
+    assert info["known_until"] == 100_000_000 and info["t"] == 105_000_000
+    np.testing.assert_allclose(info["pose"][:3, 3], START[:3, 0] * 0.1, atol=1e-9)
+
+
+def test_actions_are_twists_of_the_body(poster):
+    env = make(poster, max_angular_velocity=2)
+    env.reset(seed=1)
+    for _ in range(3):
+        *_, info = env.step([0, 0, 0, 0, 0, 5])  # clipped to 1
+    expected = START[:3, :3] @ esim.gym.rotation(np.array([0, 0, 0.06]))
+    np.testing.assert_allclose(info["pose"][:3, :3], expected, atol=1e-9)
+    np.testing.assert_allclose(esim.gym.rotation(np.array([0, 0, np.pi / 2])), [[0, -1, 0], [1, 0, 0], [0, 0, 1]], atol=1e-12)
+
+
+def test_the_seed_determines_an_episode(poster):
+    noisy = {**poster, "event_camera": {**poster["event_camera"], "threshold_noise": 0.05}}
+
+    def start(random):
+        T = START.copy()
+        T[1, 3] = random.uniform(-0.1, 0.1)
+        return T
+
+    runs = [episode(esim.gym.EventEnv(noisy, start, overrides={"duration_s": 0.05}), seed, [1, 0, 0, 0, 0, 1])[0] for seed in (1, 1, 2)]
+    np.testing.assert_array_equal(runs[0], runs[1])
+    assert (runs[0] != runs[2]).any()
+
+
+def test_reward_and_end(poster):
+    env = make(poster, reward=lambda env, info: -len(env.events), terminated=lambda env, info: info["t"] > 40_000_000)
+    _, (reward, terminated, truncated, _) = episode(env, 1, [1, 0, 0, 0, 0, 0])
+    assert reward < 0 and terminated and not truncated
+    with pytest.raises(esim.Error, match="reset"):
+        env.step(np.zeros(6))
+
+
+def test_bad_arguments(poster):
+    with pytest.raises(esim.Error, match="multiple of interval_s"):
+        make(poster, step_s=0.012)
+    with pytest.raises(esim.Error, match="observation"):
+        make(poster, observation="frames")
+    with pytest.raises(esim.Error, match="several event sensors"):
+        make(poster, overrides={"duration_s": 0.1, "event_camera.contrast_threshold": {"values": [0.2, 0.4]}})

@@ -333,6 +333,11 @@ class LiveSimulation(_Running):
         self.latency = latency
         self.pose_t = self.start + latency + interval
 
+    def _moved(self, poses):
+        """Counts poses that the body has taken. Returns the time of the last one, ns."""
+        self.pose_t += poses * self._interval
+        return self.pose_t - self._interval
+
     def step(self, T_world_body):
         """Moves the body to its pose at `pose_t`, and simulates up to `latency` before it.
 
@@ -352,7 +357,7 @@ class LiveSimulation(_Running):
             where it is. After the end.
         """
         self._core.push(_checks.pose(T_world_body, "T_world_body"))
-        self.pose_t += self._interval
+        self._moved(1)
         while True:
             self._core.append_next(self._made)
             made = self._made.pop()
@@ -494,6 +499,25 @@ def simulate_live(
     esim.Error
         For problems of the scenario or the pose, with the key and the valid values.
     """
+    return begin_live(
+        scenario,
+        T_world_body,
+        interval_s=interval_s,
+        smooth=smooth,
+        overrides=overrides,
+        threads=threads,
+        seed=seed,
+        out=out,
+        force=force,
+        packet_s=packet_s,
+    )
+
+
+def begin_live(
+    scenario, T_world_body, *, interval_s, smooth=False, overrides=None, threads=0, seed=None, out=None, force=False, packet_s=None,
+    scene=None,
+):
+    """simulate_live() with the shared scene of a scenario with the same renderer and cameras, if it is given."""
     interval_s = _checks.number(interval_s, "interval_s", low=1e-6, high=10)
     scenario = to_scenario(scenario)
     seeded = [] if seed is None else [f"seed={_checks.seed(seed)}"]
@@ -511,5 +535,6 @@ def simulate_live(
         "" if out is None else os.fspath(out),
         _checks.flag(force, "force"),
         "a program moved the body",
+        scene,
     )
     return LiveSimulation(core, interval, (order // 2 - 1) * interval)

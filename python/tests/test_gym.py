@@ -84,3 +84,51 @@ def test_bad_arguments(poster):
         make(poster, observation="frames")
     with pytest.raises(esim.Error, match="several event sensors"):
         make(poster, overrides={"duration_s": 0.1, "event_camera.contrast_threshold": {"values": [0.2, 0.4]}})
+
+
+def make_vector(poster, count, **options):
+    return esim.gym.EventVectorEnv(
+        count, poster, START, **{"overrides": {"duration_s": 0.1, "sampling": {"type": "flow", "min_rate_hz": 200}}, **options}
+    )
+
+
+def test_many_agents_see_what_one_sees(poster):
+    noisy = {**poster, "event_camera": {**poster["event_camera"], "threshold_noise": 0.05}}
+    actions = np.array([[1, 0, 0, 0, 0, 0], [0, 1, 0, 0, 0, 0.5], [0, 0, 0, 0, 0, 1]])
+    runs = []
+    for threads in (1, 2):
+        env = make_vector(noisy, 3, threads=threads)
+        images, _ = env.reset(seed=5)
+        runs.append([images, *(env.step(actions)[0] for _ in range(10))])
+        env.close()
+    np.testing.assert_array_equal(runs[0], runs[1])
+    for i in range(3):
+        alone, _ = episode(make(noisy), 5 + i, actions[i])
+        np.testing.assert_array_equal(alone, np.array(runs[0])[:, i])
+
+
+def test_episodes_end_and_begin_by_themselves(poster):
+    def terminated(env, infos):
+        return infos["pose"][:, 2, 3] > 0.0349  # agent 1 rises by 1 cm in each step
+
+    env = make_vector(poster, 2, terminated=terminated, reward=lambda env, infos: infos["pose"][:, 2, 3])
+    env.reset(seed=1)
+    actions = np.array([[0, 0, 0, 0, 0, 0], [0, -1, 0, 0, 0, 0]])
+    rows = []
+    for _ in range(12):
+        images, rewards, ended, truncated, infos = env.step(actions)
+        assert images.shape == (2, 5, 30, 40) and images.dtype == np.float32
+        rows.append((rewards[1], ended.tolist(), truncated.tolist(), infos["t"].tolist()))
+    assert [row[1] for row in rows] == [[False, k in (3, 8)] for k in range(12)]  # after four steps, and one that begins
+    assert rows[4][0] == 0 and rows[4][3][1] == 0 and rows[5][0] == pytest.approx(0.01)
+    assert [row[2][0] for row in rows] == [k == 9 for k in range(12)] and rows[10][3][0] == 0
+
+
+def test_gymnasium_makes_it(poster):
+    env = gymnasium.make_vec("esim/Events-v0", num_envs=2, vectorization_mode="vector_entry_point", scenario=poster, start=START)
+    images, _ = env.reset(seed=[3, 4])
+    assert env.observation_space.contains(images) and env.action_space.shape == (2, 6)
+    assert env.step(env.action_space.sample())[0] in env.observation_space
+    with pytest.raises(esim.Error, match="3 seeds for 2"):
+        env.reset(seed=[1, 2, 3])
+    env.close()

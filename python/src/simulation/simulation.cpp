@@ -84,7 +84,9 @@ void Simulation::build(const Substitutes& substitutes, const std::string& origin
   }
   live_ = options.live;
   if (live_ != nullptr) {
-    world_ = std::make_unique<World>(build_world(scenario_, live_, options.threads, notices));
+    world_ = std::make_unique<World>(options.scene != nullptr
+                                         ? build_world(scenario_, *options.scene, live_, options.threads, notices)
+                                         : build_world(scenario_, live_, options.threads, notices));
   } else {
     if (!substitutes.make_renderer) cache_ = open_image_cache(options.images, scenario_.renderer, notices.warning);
     world_ = std::make_unique<World>(build_world(scenario_, substitutes, options.threads, notices, cache_));
@@ -176,6 +178,16 @@ std::optional<Packet> Simulation::next() {
   }
   if (!packets_->has_packet()) return std::nullopt;
   return packets_->take();
+}
+
+std::vector<Packet> Simulation::catch_up() {
+  std::vector<Packet> packets;
+  while (packets_->has_packet() || !over_) {
+    if (!packets_->has_packet() && !over_ && !advance()) break;
+    if (!packets_->has_packet()) break;
+    packets.push_back(packets_->take());
+  }
+  return packets;
 }
 
 void Simulation::close() {

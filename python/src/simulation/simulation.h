@@ -6,6 +6,7 @@
 #include <memory>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "esim/compose/compose.h"
@@ -24,7 +25,8 @@ struct SimulationOptions {
   bool force = false;         ///< replace an existing recording
   Repetition repetition{};    ///< for the report of the recording
   ImageCacheOptions images{};
-  std::shared_ptr<OnlineTrajectory> live{};  ///< the motion of the body, if it becomes known during the simulation
+  std::shared_ptr<OnlineTrajectory> live{};    ///< the motion of the body, if it becomes known during the simulation
+  std::shared_ptr<const LoadedScene> scene{};  ///< of a live simulation; unset: the scenario's is loaded
 };
 
 /// A simulation packet by packet. Callers hold the GIL, which is released during the simulation.
@@ -37,6 +39,15 @@ class Simulation {
 
   /// Adds the next pose of the body of a live simulation.
   void push(const SE3& T_world_body);
+
+  /// Simulates a live simulation as far as its motion is known, on any thread, without the GIL. Returns the complete
+  /// packets.
+  std::vector<Packet> catch_up();
+
+  /// Throws the exception of a signal handler that stopped catch_up(). Needs the GIL.
+  void raise_signal() {
+    if (signal_) throw nanobind::python_error(*std::exchange(signal_, std::nullopt));
+  }
 
   /// The next packet; empty after the last, and in live simulations also before later poses are known. Throws the
   /// Python exception of a signal handler or a renderer; after a signal, the simulation can continue.

@@ -264,7 +264,7 @@ World build_motions(const Scenario& scenario, const SceneFile& scene, std::share
 /// Everything. All other functions that build a world end here.
 World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<const Trajectory> body,
             const TimeSpan& span, const Substitutes& substitutes, int threads, const Notices& notices,
-            const std::shared_ptr<ImageCache>& cache = nullptr) {
+            const std::shared_ptr<ImageCache>& cache = nullptr, const RendererFactory* renderers_of_scene = nullptr) {
   std::ranges::for_each(scenario.notices, notices.warning);
   check_substitutes(scenario, substitutes, span);
   World world = build_motions(scenario, scene, std::move(body), span, substitutes, threads, notices);
@@ -278,7 +278,8 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
     world.info.cameras.push_back(camera_info(options, followed));
   }
   const RendererFactory make_renderer =
-      substitutes.make_renderer
+      renderers_of_scene != nullptr ? *renderers_of_scene
+      : substitutes.make_renderer
           ? RendererFactory{[&](const Camera& camera, ColourFilters, const Workers& workers) {
               return substitutes.make_renderer(camera, workers);
             }}
@@ -392,13 +393,32 @@ World build_world(const Scenario& scenario, const Substitutes& substitutes, int 
   return build(scenario, scene, std::move(body), span, substitutes, threads, notices, cache);
 }
 
-World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> body, int threads,
-                  const Notices& notices) {
+struct LoadedScene {
+  SceneFile scene;
+  RendererFactory renderers;
+};
+
+std::shared_ptr<const LoadedScene> load_scene(const Scenario& scenario, const Notices& notices) {
+  SceneFile scene = load_scenes(scenario, look_of(scenario), notices);
+  std::vector<CameraInfo> cameras;
+  for (const CameraOptions& options : scenario.cameras)
+    cameras.push_back(camera_info(options, followed_camera(scenario, scene)));
+  RendererFactory renderers = build_renderer_factory(scenario.renderer, scene, sees_colour(scenario), cameras, notices);
+  return std::make_shared<const LoadedScene>(LoadedScene{std::move(scene), std::move(renderers)});
+}
+
+World build_world(const Scenario& scenario, const LoadedScene& loaded, std::shared_ptr<const Trajectory> body,
+                  int threads, const Notices& notices) {
   if (!scenario.duration_s) throw UserError("duration_s: is missing; an online motion does not define one");
   const TimeNs start = body->start() + to_ns(scenario.start_s);
   const TimeSpan span{start, start + to_ns(*scenario.duration_s)};
-  const SceneFile scene = load_scenes(scenario, look_of(scenario), notices);
-  return build(scenario, scene, std::move(body), span, Substitutes{}, threads, notices);
+  return build(scenario, loaded.scene, std::move(body), span, Substitutes{}, threads, notices, nullptr,
+               &loaded.renderers);
+}
+
+World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> body, int threads,
+                  const Notices& notices) {
+  return build_world(scenario, *load_scene(scenario, notices), std::move(body), threads, notices);
 }
 
 }  // namespace esim::inline compose

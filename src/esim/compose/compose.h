@@ -49,6 +49,15 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices,
 World build_world(const Scenario& scenario, std::shared_ptr<const Trajectory> body, int threads,
                   const Notices& notices);
 
+struct LoadedScene;
+
+/// The scene of a scenario with its renderers, for several worlds at once, whose bodies move differently.
+std::shared_ptr<const LoadedScene> load_scene(const Scenario& scenario, const Notices& notices);
+
+/// The same with the scene of a scenario with the same renderer and cameras.
+World build_world(const Scenario& scenario, const LoadedScene& loaded, std::shared_ptr<const Trajectory> body,
+                  int threads, const Notices& notices);
+
 /// Parts that replace those of a scenario, if set.
 struct Substitutes {
   std::shared_ptr<const Trajectory> body;  ///< completely known

@@ -1,0 +1,132 @@
+"""An environment for many agents at once."""
+
+import gymnasium
+import numpy as np
+from gymnasium.vector.utils import batch_space
+
+from .. import _checks, _core
+from .._errors import Error
+from .._simulate import Packet
+from ._view import View
+
+
+class EventVectorEnv(gymnasium.vector.VectorEnv):
+    """Many cameras in one scene, each moved by an agent of its own, in one process: they share the scene, and run in
+    parallel on all processors.
+
+    As `EventEnv`, with arrays of shape (num_envs, ...). After an episode of an agent ends, its next step begins another
+    (`AutoresetMode.NEXT_STEP`). `events` and `packets` of the last step are lists, by agent. Seeds, observations and
+    rewards do not depend on the number of threads.
+
+    Parameters
+    ----------
+    num_envs : int
+    scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, overrides, threads
+        As of `EventEnv`.
+    reward : callable, optional
+        `reward(env, infos)`: floats, shape (num_envs,). Default: 0.
+    terminated : callable, optional
+        `terminated(env, infos)`: bools, shape (num_envs,). Default: False.
+    """
+
+    metadata = {"render_modes": [], "autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP}
+
+    def __init__(
+        self,
+        num_envs,
+        scenario,
+        start,
+        *,
+        reward=None,
+        terminated=None,
+        step_s=0.01,
+        interval_s=0.005,
+        max_velocity=1.0,
+        max_angular_velocity=1.0,
+        observation="voxels",
+        bins=5,
+        overrides=None,
+        threads=0,
+    ):
+        self.num_envs = _checks.whole(num_envs, "num_envs", 1, 100_000)
+        self._view = View(scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, overrides)
+        self.single_observation_space, self.single_action_space = self._view.observation_space, self._view.action_space
+        self.observation_space = batch_space(self.single_observation_space, self.num_envs)
+        self.action_space = batch_space(self.single_action_space, self.num_envs)
+        self._reward, self._terminated = reward, terminated
+        self._scene = self._view.share_scene(_checks.threads(threads))
+        self._simulations = [None] * self.num_envs
+        self._randoms = [None] * self.num_envs
+        self._over = np.zeros(self.num_envs, bool)
+        self.pose = np.tile(np.eye(4), (self.num_envs, 1, 1))
+        self._t = np.zeros(self.num_envs, np.int64)
+        self._known_until = np.zeros(self.num_envs, np.int64)
+
+    def _begin(self, i):
+        if self._simulations[i] is not None:
+            self._simulations[i].close()
+        random = self._randoms[i]
+        self.pose[i] = self._view.draw_start(random)
+        simulation = self._view.begin(self.pose[i], int(random.integers(2**32)), threads=1, scene=self._scene)
+        self._simulations[i] = simulation
+        self._t[i] = self._known_until[i] = simulation.start
+
+    def _observe(self, packets):
+        self.packets, self.events = packets, [self._view.events(own) for own in packets]
+        for i, own in enumerate(packets):
+            if own:
+                self._known_until[i] = own[-1].t1
+        images = np.empty(self.observation_space.shape, np.float32)
+        for image, events, own in zip(images, self.events, packets):
+            image[:] = self._view.image(events, own)
+        infos = {"t": self._t.copy(), "known_until": self._known_until.copy(), "pose": self.pose.copy()}
+        return images, infos
+
+    def reset(self, *, seed=None, options=None):
+        """Begins an episode of each agent. `seed`: an int, to which the number of the agent is added, or one for each."""
+        if seed is not None or self._randoms[0] is None:
+            if seed is None or np.ndim(seed) == 0:
+                first = int(np.random.default_rng().integers(2**32)) if seed is None else seed
+                seed = [first + i for i in range(self.num_envs)]
+            if len(seed) != self.num_envs:
+                raise Error(f"{len(seed)} seeds for {self.num_envs} environments")
+            self._randoms = [gymnasium.utils.seeding.np_random(None if one is None else int(one))[0] for one in seed]
+        for i in range(self.num_envs):
+            self._begin(i)
+        self._over[:] = False
+        return self._observe([[] for _ in range(self.num_envs)])
+
+    def step(self, actions):
+        """Moves all bodies for step_s, except those whose episode has ended: these begin again."""
+        if self._simulations[0] is None:
+            raise Error("reset() comes before step()")
+        fresh = self._over.copy()
+        for i in np.flatnonzero(fresh):
+            self._begin(i)
+        moving = np.flatnonzero(~fresh)
+        packets = [[] for _ in range(self.num_envs)]
+        if len(moving):
+            poses = self._view.move(self.pose[moving], np.asarray(actions)[moving])
+            simulations = [self._simulations[i] for i in moving]
+            made = _core.step_together([simulation._core for simulation in simulations], poses, self._scene)
+            for i, simulation, path, own in zip(moving, simulations, poses, made):
+                self.pose[i] = path[-1]
+                self._t[i] = simulation._moved(len(path))
+                packets[i] = [Packet(parts, simulation.cameras) for parts in own]
+        images, infos = self._observe(packets)
+        ends = np.array([simulation.end + simulation.latency for simulation in self._simulations])
+        truncated = ~fresh & (self._t >= ends)
+        terminated, rewards = np.zeros(self.num_envs, bool), np.zeros(self.num_envs)
+        if self._terminated:
+            terminated = np.asarray(self._terminated(self, infos), bool) & ~fresh
+        if self._reward:
+            rewards = np.where(fresh, 0.0, np.asarray(self._reward(self, infos), np.float64))
+        self._over = terminated | truncated
+        return images, rewards, terminated, truncated, infos
+
+    def close_extras(self, **_):
+        """Ends all episodes."""
+        for simulation in self._simulations:
+            if simulation is not None:
+                simulation.close()
+        self._simulations = [None] * self.num_envs

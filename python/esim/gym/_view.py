@@ -1,0 +1,90 @@
+"""What the environments share: how an agent moves and what it sees."""
+
+import gymnasium
+import numpy as np
+
+from .. import _checks, _core
+from .._errors import Error
+from .._events import Events
+from .._represent import event_count, voxel_grid
+from .._scenario import to_overrides, to_scenario
+from .._simulate import begin_live
+from .._types import EVENT_DTYPE
+
+
+def rotation(vectors):
+    """The rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad."""
+    vectors = np.asarray(vectors, np.float64)
+    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    x, y, z = np.moveaxis(vectors, -1, 0)
+    zero = np.zeros_like(x)
+    K = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*vectors.shape, 3)
+    return np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (K @ K)
+
+
+class View:
+    """The arguments of an environment, checked."""
+
+    def __init__(self, scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, overrides):
+        self.scenario, self.overrides, self.start = to_scenario(scenario), overrides, start
+        self.step_s = _checks.number(step_s, "step_s", above=0)
+        self.interval_s = _checks.number(interval_s, "interval_s", low=1e-6, high=10)
+        self.poses = round(self.step_s / self.interval_s)  # of a step
+        if self.poses < 1 or abs(self.poses * self.interval_s - self.step_s) > 1e-9:
+            raise Error(f"step_s must be a multiple of interval_s = {interval_s:g} s, not {step_s:g} s")
+        velocity = _checks.number(max_velocity, "max_velocity", low=0)
+        angular = _checks.number(max_angular_velocity, "max_angular_velocity", low=0)
+        self.limits = np.array([velocity] * 3 + [angular] * 3)
+        self.observation = _checks.one_of(observation, "observation", ("voxels", "counts"))
+        self.bins = _checks.whole(bins, "bins", 1, 1000)
+        with self.begin(self.draw_start(np.random.default_rng(0)), 0) as simulation:
+            (camera,) = simulation.cameras.values()
+        if camera["sensors"]:
+            raise Error("the scenario has several event sensors: name one in event_camera")
+        self.width, self.height = camera["width"], camera["height"]
+        channels = self.bins if self.observation == "voxels" else 2
+        low = -np.inf if self.observation == "voxels" else 0
+        self.observation_space = gymnasium.spaces.Box(low, np.inf, (channels, self.height, self.width), np.float32)
+        self.action_space = gymnasium.spaces.Box(-1, 1, (6,), np.float32)
+
+    def draw_start(self, random):
+        """The pose at the start of an episode."""
+        return np.array(self.start(random) if callable(self.start) else self.start, np.float64)
+
+    def begin(self, pose, seed, **options):
+        """A live simulation."""
+        return begin_live(
+            self.scenario, pose, interval_s=self.interval_s, packet_s=self.step_s, overrides=self.overrides, seed=seed, **options
+        )
+
+    def share_scene(self, threads):
+        """The scene, for several simulations on so many threads."""
+        return _core.SharedScene(self.scenario._read(to_overrides(self.overrides), True, False), threads)
+
+    def move(self, poses, actions):
+        """The poses of a step, (N, self.poses, 4, 4), from poses (N, 4, 4) on: constant velocities in the bodies' frames."""
+        twists = np.clip(np.asarray(actions, np.float64), -1, 1) * self.limits
+        turns = rotation(self.interval_s * twists[:, 3:])
+        moved = np.empty((len(poses), self.poses, 4, 4))
+        for k in range(self.poses):
+            R = poses[:, :3, :3]
+            moved[:, k] = poses
+            moved[:, k, :3, 3] += self.interval_s * (R @ twists[:, :3, None])[..., 0]
+            moved[:, k, :3, :3] = R @ turns
+            poses = moved[:, k]
+        return moved
+
+    def events(self, packets):
+        """The events of packets."""
+        if len(packets) == 1:
+            return packets[0].events
+        none = Events(np.empty(0, EVENT_DTYPE), self.width, self.height)
+        return np.concatenate([none, *(packet.events for packet in packets)])
+
+    def image(self, events, packets):
+        """The observation."""
+        if self.observation == "counts":
+            return event_count(events).astype(np.float32)
+        if not packets:
+            return np.zeros(self.observation_space.shape, np.float32)
+        return voxel_grid(events, bins=self.bins, t0=_checks.ns(packets[0].t0), t1=_checks.ns(packets[-1].t1))

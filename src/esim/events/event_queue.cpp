@@ -111,7 +111,7 @@ void EventQueue::drop_bins(std::size_t count) {
   for (std::size_t bin = 0; bin < count; ++bin) bins_[bin].clear();
   const EventPacking endless = packing_of(kBins - 1);
   begin_ = packing_of(count).origin;
-  std::ranges::rotate(bins_, bins_.begin() + static_cast<std::ptrdiff_t>(count));
+  std::rotate(bins_.begin(), bins_.begin() + static_cast<std::ptrdiff_t>(count), bins_.end());
   // Events of the bin without an end may now belong to later bins.
   const std::vector<std::uint64_t> moved = std::exchange(bins_[kBins - 1 - count], {});
   waiting_ -= moved.size();

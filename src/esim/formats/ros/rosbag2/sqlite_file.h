@@ -6,7 +6,7 @@
 #include <string>
 #include <string_view>
 
-#include "esim/formats/ros/messages/bytes.h"
+#include "esim/formats/ros/messages/message_codec.h"
 
 struct sqlite3;
 struct sqlite3_stmt;

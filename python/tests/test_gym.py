@@ -132,3 +132,28 @@ def test_gymnasium_makes_it(poster):
     with pytest.raises(esim.Error, match="3 seeds for 2"):
         env.reset(seed=[1, 2, 3])
     env.close()
+
+
+EVERYTHING = ["voxels", "counts", "time_surface", "depth", "motion_field", "imu", "pose"]
+
+
+def test_everything_can_be_seen(poster):
+    overrides = {"duration_s": 0.1, "sampling": {"type": "flow", "min_rate_hz": 200}, "truth.rate_hz": 100}
+    check_env(make(poster, observation=EVERYTHING, overrides=overrides), skip_render_check=True)
+    env = make_vector(poster, 2, observation=EVERYTHING, overrides=overrides)
+    env.reset(seed=1)
+    events = [[], []]
+    for _ in range(5):
+        seen, *_, infos = env.step([[1, 0, 0, 0, 0, 0], [0, 0, 0.5, 0, 0, 1]])
+        for own, new in zip(events, env.events):
+            own.append(new)
+    assert env.observation_space.contains(seen)
+    for i in range(2):
+        packet = env.packets[i][-1]
+        np.testing.assert_array_equal(seen["depth"][i], packet.depth[-1])
+        np.testing.assert_array_equal(seen["motion_field"][i], packet.motion_field[-1])
+        np.testing.assert_allclose(seen["pose"][i], infos["pose"][i], rtol=1e-6)
+        np.testing.assert_allclose(seen["imu"][i], [*packet.imu[-1]["angular_rate"], *packet.imu[-1]["specific_force"]], rtol=1e-6)
+        np.testing.assert_array_equal(seen["counts"][i], esim.event_count(env.events[i]))
+        surface = esim.time_surface(np.concatenate(events[i]), t=esim.ns(packet.t1))
+        np.testing.assert_allclose(seen["time_surface"][i], surface, atol=1e-6)

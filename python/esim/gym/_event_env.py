@@ -9,8 +9,7 @@ from ._view import View
 class EventEnv(gymnasium.Env):
     """A camera that an agent moves. Subclasses, or the arguments, define start, reward and end.
 
-    Observations are images of the events of the step: float32, shape (bins, height, width) or (2, height, width). They are
-    those that are known by then: `info["known_until"]`. The action is a twist of the body: velocity (m/s) and angular
+    Observations are float32 arrays of what is known by the end of the step: `info["known_until"]`. The action is a twist of the body: velocity (m/s) and angular
     velocity (rad/s) in its own frame, x y z, each from -1 to 1 times its limit.
 
     `info` has `t` (the time of the step's last pose, ns), `known_until` (ns) and `pose` (4, 4). The environment itself has
@@ -32,10 +31,19 @@ class EventEnv(gymnasium.Env):
         Time between two poses, s, as of `esim.simulate_live`.
     max_velocity, max_angular_velocity : float
         m/s, rad/s.
-    observation : {"voxels", "counts"}
-        `esim.voxel_grid`, or `esim.event_count`.
+    observation : str, or list of str
+        What the agent sees: one array, or a dict of arrays.
+
+        - "voxels", (bins, height, width): `esim.voxel_grid` of the events of the step;
+        - "counts", (2, height, width): `esim.event_count` of these;
+        - "time_surface", (2, height, width): `esim.time_surface` of all events so far;
+        - "depth", (height, width), m, and "motion_field", (2, height, width), px/s: the latest ground truth;
+        - "imu", (6,): the latest angular rate and specific force;
+        - "pose", (4, 4): of the body.
     bins : int
         Of the voxel grid.
+    tau_s : float
+        Of the time surface, s.
     overrides : dict or list of str, optional
         Options of the scenario to change.
     threads : int
@@ -57,10 +65,11 @@ class EventEnv(gymnasium.Env):
         max_angular_velocity=1.0,
         observation="voxels",
         bins=5,
+        tau_s=0.03,
         overrides=None,
         threads=0,
     ):
-        self._view = View(scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, overrides)
+        self._view = View(scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, tau_s, overrides)
         self.observation_space, self.action_space = self._view.observation_space, self._view.action_space
         self._reward, self._terminated, self._threads = reward, terminated, threads
         self._simulation = None
@@ -71,13 +80,14 @@ class EventEnv(gymnasium.Env):
         if packets:
             self._known_until = packets[-1].t1
         info = {"t": self._t, "known_until": self._known_until, "pose": self.pose.copy()}
-        return self._view.image(self.events, packets), info
+        return self._view.observe(self._seen, self.events, packets, self.pose), info
 
     def reset(self, *, seed=None, options=None):
         """Begins an episode with a sensor of its own: its noise follows from `seed`."""
         super().reset(seed=seed)
         self.close()
         self.pose = self._view.draw_start(self.np_random)
+        self._seen = dict(self._view.blank)
         self._simulation = self._view.begin(self.pose, int(self.np_random.integers(2**32)), threads=self._threads)
         self._t = self._known_until = self._simulation.start
         return self._observe([])

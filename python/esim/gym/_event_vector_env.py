@@ -2,7 +2,7 @@
 
 import gymnasium
 import numpy as np
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector.utils import batch_space, concatenate, create_empty_array
 
 from .. import _checks, _core
 from .._errors import Error
@@ -21,7 +21,7 @@ class EventVectorEnv(gymnasium.vector.VectorEnv):
     Parameters
     ----------
     num_envs : int
-    scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, overrides, threads
+    scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, tau_s, overrides, threads
         As of `EventEnv`.
     reward : callable, optional
         `reward(env, infos)`: floats, shape (num_envs,). Default: 0.
@@ -45,11 +45,12 @@ class EventVectorEnv(gymnasium.vector.VectorEnv):
         max_angular_velocity=1.0,
         observation="voxels",
         bins=5,
+        tau_s=0.03,
         overrides=None,
         threads=0,
     ):
         self.num_envs = _checks.whole(num_envs, "num_envs", 1, 100_000)
-        self._view = View(scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, overrides)
+        self._view = View(scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, tau_s, overrides)
         self.single_observation_space, self.single_action_space = self._view.observation_space, self._view.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
@@ -57,6 +58,7 @@ class EventVectorEnv(gymnasium.vector.VectorEnv):
         self._scene = self._view.share_scene(_checks.threads(threads))
         self._simulations = [None] * self.num_envs
         self._randoms = [None] * self.num_envs
+        self._seen = [{} for _ in range(self.num_envs)]
         self._over = np.zeros(self.num_envs, bool)
         self.pose = np.tile(np.eye(4), (self.num_envs, 1, 1))
         self._t = np.zeros(self.num_envs, np.int64)
@@ -69,6 +71,7 @@ class EventVectorEnv(gymnasium.vector.VectorEnv):
         self.pose[i] = self._view.draw_start(random)
         simulation = self._view.begin(self.pose[i], int(random.integers(2**32)), threads=1, scene=self._scene)
         self._simulations[i] = simulation
+        self._seen[i] = dict(self._view.blank)
         self._t[i] = self._known_until[i] = simulation.start
 
     def _observe(self, packets):
@@ -76,9 +79,11 @@ class EventVectorEnv(gymnasium.vector.VectorEnv):
         for i, own in enumerate(packets):
             if own:
                 self._known_until[i] = own[-1].t1
-        images = np.empty(self.observation_space.shape, np.float32)
-        for image, events, own in zip(images, self.events, packets):
-            image[:] = self._view.image(events, own)
+        all_seen = [
+            self._view.observe(seen, events, own, pose) for seen, events, own, pose in zip(self._seen, self.events, packets, self.pose)
+        ]
+        space = self.single_observation_space
+        images = concatenate(space, all_seen, create_empty_array(space, self.num_envs))
         infos = {"t": self._t.copy(), "known_until": self._known_until.copy(), "pose": self.pose.copy()}
         return images, infos
 

@@ -6,7 +6,7 @@ import numpy as np
 from .. import _checks, _core
 from .._errors import Error
 from .._events import Events
-from .._represent import event_count, voxel_grid
+from .._represent import event_count, time_surface, voxel_grid
 from .._scenario import to_overrides, to_scenario
 from .._simulate import begin_live
 from .._types import EVENT_DTYPE
@@ -22,10 +22,15 @@ def rotation(vectors):
     return np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (K @ K)
 
 
+OBSERVATIONS = ("voxels", "counts", "time_surface", "depth", "motion_field", "imu", "pose")
+
+
 class View:
     """The arguments of an environment, checked."""
 
-    def __init__(self, scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, overrides):
+    def __init__(
+        self, scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, tau_s, overrides
+    ):
         self.scenario, self.overrides, self.start = to_scenario(scenario), overrides, start
         self.step_s = _checks.number(step_s, "step_s", above=0)
         self.interval_s = _checks.number(interval_s, "interval_s", low=1e-6, high=10)
@@ -35,16 +40,31 @@ class View:
         velocity = _checks.number(max_velocity, "max_velocity", low=0)
         angular = _checks.number(max_angular_velocity, "max_angular_velocity", low=0)
         self.limits = np.array([velocity] * 3 + [angular] * 3)
-        self.observation = _checks.one_of(observation, "observation", ("voxels", "counts"))
+        self.alone = isinstance(observation, str)
+        self.names = [_checks.one_of(name, "observation", OBSERVATIONS) for name in ([observation] if self.alone else observation)]
         self.bins = _checks.whole(bins, "bins", 1, 1000)
+        self.tau_s = _checks.seconds(tau_s, "tau_s", above=0)
         with self.begin(self.draw_start(np.random.default_rng(0)), 0) as simulation:
             (camera,) = simulation.cameras.values()
         if camera["sensors"]:
             raise Error("the scenario has several event sensors: name one in event_camera")
         self.width, self.height = camera["width"], camera["height"]
-        channels = self.bins if self.observation == "voxels" else 2
-        low = -np.inf if self.observation == "voxels" else 0
-        self.observation_space = gymnasium.spaces.Box(low, np.inf, (channels, self.height, self.width), np.float32)
+        size = (self.height, self.width)
+        shapes = {
+            "voxels": (self.bins, *size),
+            "counts": (2, *size),
+            "time_surface": (2, *size),
+            "depth": size,
+            "motion_field": (2, *size),
+            "imu": (6,),
+            "pose": (4, 4),
+        }
+        limits = {"counts": (0, np.inf), "time_surface": (0, 1), "depth": (0, np.inf)}
+        spaces = {
+            name: gymnasium.spaces.Box(*limits.get(name, (-np.inf, np.inf)), shapes[name], np.float32) for name in self.names
+        }
+        self.observation_space = spaces[observation] if self.alone else gymnasium.spaces.Dict(spaces)
+        self.blank = {name: np.zeros(space.shape, np.float32) for name, space in spaces.items()}
         self.action_space = gymnasium.spaces.Box(-1, 1, (6,), np.float32)
 
     def draw_start(self, random):
@@ -81,10 +101,23 @@ class View:
         none = Events(np.empty(0, EVENT_DTYPE), self.width, self.height)
         return np.concatenate([none, *(packet.events for packet in packets)])
 
-    def image(self, events, packets):
-        """The observation."""
-        if self.observation == "counts":
-            return event_count(events).astype(np.float32)
-        if not packets:
-            return np.zeros(self.observation_space.shape, np.float32)
-        return voxel_grid(events, bins=self.bins, t0=_checks.ns(packets[0].t0), t1=_checks.ns(packets[-1].t1))
+    def observe(self, seen, events, packets, pose):
+        """The observation. `seen`: what the agent saw last, by name; is replaced by what it sees now."""
+        span = {"t0": _checks.ns(packets[0].t0), "t1": _checks.ns(packets[-1].t1)} if packets else {}
+        for name in self.names:
+            if name == "counts":
+                seen[name] = event_count(events).astype(np.float32)
+            elif name == "voxels":
+                seen[name] = voxel_grid(events, bins=self.bins, **span) if packets else self.blank[name]
+            elif name == "pose":
+                seen[name] = pose.astype(np.float32)
+            elif name == "time_surface" and packets:
+                faded = np.float32(np.exp(-1e-9 * (packets[-1].t1 - packets[0].t0) / self.tau_s)) * seen[name]
+                seen[name] = np.maximum(faded, time_surface(events, t=span["t1"], tau_s=self.tau_s))
+            for packet in packets:
+                if name in ("depth", "motion_field") and len(getattr(packet, name)):
+                    seen[name] = getattr(packet, name)[-1]
+                elif name == "imu" and len(packet.imu):
+                    last = packet.imu[-1]
+                    seen[name] = np.concatenate([last["angular_rate"], last["specific_force"]]).astype(np.float32)
+        return seen[self.names[0]].copy() if self.alone else {name: seen[name].copy() for name in self.names}

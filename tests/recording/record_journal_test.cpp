@@ -138,7 +138,7 @@ TEST_F(Journal, RefusesDamage) {
     }
   }
   EXPECT_GT(refused, bytes * 9 / 10);
-  EXPECT_THROW(RecordJournal(folder_.path() / "absent", 10, std::make_unique<Nowhere>()), OutputError);
+  EXPECT_THROW(RecordJournal(folder_.path() / "absent", 10, std::make_unique<Nowhere>()), UserError);
 }
 
 }  // namespace

@@ -1,11 +1,7 @@
 #include "esim/recording/record_journal.h"
 
-#include <fcntl.h>
-#include <unistd.h>
-
-#include <algorithm>
 #include <array>
-#include <cerrno>
+#include <cstring>
 #include <string>
 #include <utility>
 #include <vector>
@@ -13,7 +9,7 @@
 #include "esim/core/error.h"
 #include "esim/core/state_archive.h"
 #include "esim/files/codecs/zstandard.h"
-#include "esim/files/output_file.h"
+#include "esim/files/input_file.h"
 
 namespace esim::inline recording {
 namespace {
@@ -231,111 +227,73 @@ constexpr int kLevel = -10;
 
 // --- the file -----------------------------------------------------------------------------------------------
 
-class RecordJournal::File {
- public:
-  File(std::filesystem::path path, int flags)
-      : path_(std::move(path)), descriptor_(::open(path_.c_str(), O_RDWR | O_CLOEXEC | flags, 0666)) {
-    if (descriptor_ < 0) throw_cannot_write(path_, system_reason(errno));
-  }
-  ~File() { ::close(descriptor_); }
-  File(const File&) = delete;
-  File& operator=(const File&) = delete;
-
-  std::vector<std::byte> records;  // not in the file yet
-
-  /// Appends the records to the file as one block.
-  void write_block() {
-    if (records.empty()) return;
-    compress_zstandard({reinterpret_cast<const char*>(records.data()), records.size()}, kLevel, frame_);
-    const BlockHeader header{records.size(), frame_.size()};
-    append(&header, sizeof header);
-    append(frame_.data(), frame_.size());
-    records.clear();
-  }
-
-  std::uint64_t make_durable() {
-    if (::fdatasync(descriptor_) != 0 && errno != EINVAL) throw_cannot_write(path_, system_reason(errno));
-    return size_;
-  }
-
-  /// Passes on the records of the first bytes of the file, and removes the rest.
-  void replay(std::uint64_t bytes, Sink& out) {
-    while (size_ < bytes) {
-      BlockHeader header;
-      read(&header, sizeof header, bytes);
-      if (header.compressed > bytes - size_) damaged();
-      frame_.resize(header.compressed);
-      read(frame_.data(), frame_.size(), bytes);
-      if (zstandard_content_size(frame_) != header.bytes) damaged();
-      std::vector<std::byte> block(header.bytes);
-      if (!decompress_zstandard(frame_, {reinterpret_cast<char*>(block.data()), block.size()})) damaged();
-      for (StateReader from(block); !from.at_end();) {
-        std::uint8_t kind = 0;
-        from.value(kind);
-        pass_next(kind, from, out);
-      }
-    }
-    if (::ftruncate(descriptor_, static_cast<off_t>(size_)) != 0) throw_cannot_write(path_, system_reason(errno));
-  }
-
- private:
-  void append(const void* from, std::size_t count) {
-    for (std::size_t done = 0; done < count;) {
-      const ssize_t written =
-          ::pwrite(descriptor_, static_cast<const char*>(from) + done, count - done, static_cast<off_t>(size_ + done));
-      if (written < 0 && errno == EINTR) continue;
-      if (written < 0) throw_cannot_write(path_, system_reason(errno));
-      done += static_cast<std::size_t>(written);
-    }
-    size_ += count;
-  }
-  void read(void* to, std::size_t count, std::uint64_t end) {
-    if (count > end - size_) damaged();
-    for (std::size_t done = 0; done < count;) {
-      const ssize_t got =
-          ::pread(descriptor_, static_cast<char*>(to) + done, count - done, static_cast<off_t>(size_ + done));
-      if (got < 0 && errno == EINTR) continue;
-      if (got <= 0) damaged();
-      done += static_cast<std::size_t>(got);
-    }
-    size_ += count;
-  }
-  [[noreturn]] void damaged() const {
-    throw UserError(path_.string() + " is damaged, and the simulation cannot be resumed; simulate it again");
-  }
-
-  std::filesystem::path path_;
-  int descriptor_;
-  std::uint64_t size_ = 0;  // of the valid part
-  std::string frame_;
-};
-
 RecordJournal::RecordJournal(std::filesystem::path file, std::unique_ptr<Sink> out)
-    : file_(std::make_unique<File>(std::move(file), O_CREAT | O_TRUNC)), out_(std::move(out)) {}
+    : path_(std::move(file)), file_(std::in_place, path_), out_(std::move(out)) {}
 
 RecordJournal::RecordJournal(std::filesystem::path file, std::uint64_t valid_bytes, std::unique_ptr<Sink> out)
-    : file_(std::make_unique<File>(std::move(file), 0)), to_replay_(valid_bytes), out_(std::move(out)) {}
+    : path_(std::move(file)), to_replay_(valid_bytes), out_(std::move(out)) {
+  std::error_code error;
+  if (std::filesystem::file_size(path_, error) < valid_bytes || error) damaged();
+}
 
-RecordJournal::~RecordJournal() = default;
+void RecordJournal::damaged() const {
+  throw UserError(path_.string() + " is damaged, and the simulation cannot be resumed; simulate it again");
+}
+
+/// Passes on the records of the first bytes of the file.
+void RecordJournal::replay() {
+  InputFile file(path_);
+  const auto next = [&](std::uint64_t bytes) {
+    if (bytes > to_replay_ - file.offset()) damaged();
+    return file.read_exactly(bytes, "the records before the checkpoint");
+  };
+  while (file.offset() < to_replay_) {
+    BlockHeader header;
+    std::memcpy(&header, next(sizeof header).data(), sizeof header);
+    const std::span<const std::byte> bytes = next(header.compressed);
+    const std::string_view frame{reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+    if (zstandard_content_size(frame) != header.bytes) damaged();
+    std::vector<std::byte> block(header.bytes);
+    if (!decompress_zstandard(frame, {reinterpret_cast<char*>(block.data()), block.size()})) damaged();
+    for (StateReader from(block); !from.at_end();) {
+      std::uint8_t kind = 0;
+      from.value(kind);
+      pass_next(kind, from, *out_);
+    }
+  }
+}
 
 void RecordJournal::begin(const RecordingInfo& info) {
   out_->begin(info);
-  file_->replay(std::exchange(to_replay_, 0), *out_);
+  if (file_) return;
+  replay();
+  file_.emplace(path_, to_replay_);
+}
+
+/// Appends the records to the file as one block.
+void RecordJournal::write_block() {
+  if (records_.empty()) return;
+  compress_zstandard({reinterpret_cast<const char*>(records_.data()), records_.size()}, kLevel, frame_);
+  const BlockHeader header{records_.size(), frame_.size()};
+  file_->append({reinterpret_cast<const char*>(&header), sizeof header});
+  file_->append(frame_);
+  records_.clear();
 }
 
 void RecordJournal::write(const Record& record) {
-  StateWriter to(file_->records);
+  StateWriter to(records_);
   to.value(static_cast<std::uint8_t>(record.index()));
   std::visit([&](const auto& one) { put(to, one); }, record);
-  if (file_->records.size() >= kBlockBytes) file_->write_block();
+  if (records_.size() >= kBlockBytes) write_block();
   out_->write(record);
 }
 
 void RecordJournal::end(bool complete) { out_->end(complete); }
 
 std::uint64_t RecordJournal::checkpoint() {
-  file_->write_block();
-  return file_->make_durable();
+  write_block();
+  file_->make_durable();
+  return file_->size();
 }
 
 }  // namespace esim::inline recording

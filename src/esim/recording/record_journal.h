@@ -1,9 +1,14 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
+#include "esim/files/output_file.h"
 #include "esim/recording/record.h"
 
 namespace esim::inline recording {
@@ -19,8 +24,6 @@ class RecordJournal final : public Sink {
   /// these records on. Throws UserError if they are not there.
   RecordJournal(std::filesystem::path file, std::uint64_t valid_bytes, std::unique_ptr<Sink> out);
 
-  ~RecordJournal() override;
-
   void begin(const RecordingInfo& info) override;
   void write(const Record& record) override;
   void end(bool complete) override;
@@ -29,9 +32,15 @@ class RecordJournal final : public Sink {
   std::uint64_t checkpoint();
 
  private:
-  class File;
-  std::unique_ptr<File> file_;
+  void replay();
+  void write_block();
+  [[noreturn]] void damaged() const;
+
+  std::filesystem::path path_;
   std::uint64_t to_replay_ = 0;
+  std::optional<OutputFile> file_;  // open from begin() on, or at once if it is new
+  std::vector<std::byte> records_;  // not in the file yet
+  std::string frame_;
   std::unique_ptr<Sink> out_;
 };
 

@@ -23,7 +23,7 @@ from ._represent import (
     voxel_grid,
 )
 from ._scenario import Scenario
-from ._simulate import CameraPacket, LiveSimulation, Packet, Renderer, Report, Simulation, simulate, simulate_live
+from ._simulation import CameraPacket, LiveSimulation, Packet, Renderer, Report, Simulation, simulate, simulate_live
 from ._trajectory import Trajectory
 from ._types import CAUSES, EVENT_DTYPE, IMU_DTYPE, LABEL_DTYPE, STATE_DTYPE
 from .interpolators._video import video

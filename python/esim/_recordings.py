@@ -4,7 +4,7 @@ import os
 import warnings
 
 from . import _checks, _core
-from ._simulate import Packet
+from ._simulation import Packet
 
 
 class Recording:

@@ -77,7 +77,18 @@ def test_reward_and_end(poster):
         env.step(np.zeros(6))
 
 
+def test_bad_actions_move_nothing(poster):
+    env = make_vector(poster, 2)
+    env.reset(seed=1)
+    for bad in ([[0] * 6, [np.nan] * 6], [[0] * 6], [[0] * 5] * 2):
+        with pytest.raises(esim.Error, match="6 finite numbers"):
+            env.step(bad)
+    assert env.step(np.zeros((2, 6)))[4]["t"].tolist() == [15_000_000] * 2
+
+
 def test_bad_arguments(poster):
+    with pytest.raises(TypeError, match="observations"):
+        make(poster, observations="counts")
     with pytest.raises(esim.Error, match="multiple of interval_s"):
         make(poster, step_s=0.012)
     with pytest.raises(esim.Error, match="observation"):

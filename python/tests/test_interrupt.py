@@ -55,7 +55,7 @@ def test_ctrl_c_while_a_packet_is_made_does_not_lose_it(poster, monkeypatch):
         raise KeyboardInterrupt
 
     with monkeypatch.context() as patch:
-        patch.setattr("esim._simulate.Packet", interrupted)
+        patch.setattr("esim._simulation._simulate.Packet", interrupted)
         with pytest.raises(KeyboardInterrupt):
             next(simulation)
     np.testing.assert_array_equal(joined(simulation), uninterrupted)

@@ -9,8 +9,8 @@ from ._view import View
 class EventEnv(gymnasium.Env):
     """A camera that an agent moves. Subclasses, or the arguments, define start, reward and end.
 
-    Observations are float32 arrays of what is known by the end of the step: `info["known_until"]`. The action is a twist of the body: velocity (m/s) and angular
-    velocity (rad/s) in its own frame, x y z, each from -1 to 1 times its limit.
+    Observations are float32 arrays of what is known by the end of the step: `info["known_until"]`. The action is a twist
+    of the body: velocity (m/s) and angular velocity (rad/s) in its own frame, x y z, each from -1 to 1 times its limit.
 
     `info` has `t` (the time of the step's last pose, ns), `known_until` (ns) and `pose` (4, 4). The environment itself has
     `events` (esim.Events) and `packets` of the last step, with ground truth and IMU if the scenario has them.
@@ -25,14 +25,16 @@ class EventEnv(gymnasium.Env):
         `reward(env, info)`: a float. Default: 0.
     terminated : callable, optional
         `terminated(env, info)`: whether the episode ends. Default: never.
+    threads : int
+        0 uses every processor.
     step_s : float
-        Simulated time of a step, s: a multiple of interval_s.
+        Simulated time of a step, s: a multiple of interval_s. Default: 0.01.
     interval_s : float
-        Time between two poses, s, as of `esim.simulate_live`.
+        Time between two poses, s, as of `esim.simulate_live`. Default: 0.005.
     max_velocity, max_angular_velocity : float
-        m/s, rad/s.
+        m/s, rad/s. Default: 1.
     observation : str, or list of str
-        What the agent sees: one array, or a dict of arrays.
+        Default: "voxels". What the agent sees: one array, or a dict of arrays.
 
         - "voxels", (bins, height, width): `esim.voxel_grid` of the events of the step;
         - "counts", (2, height, width): `esim.event_count` of these;
@@ -41,35 +43,17 @@ class EventEnv(gymnasium.Env):
         - "imu", (6,): the latest angular rate and specific force;
         - "pose", (4, 4): of the body.
     bins : int
-        Of the voxel grid.
+        Of the voxel grid. Default: 5.
     tau_s : float
-        Of the time surface, s.
+        Of the time surface, s. Default: 0.03.
     overrides : dict or list of str, optional
         Options of the scenario to change.
-    threads : int
-        0 uses every processor.
     """
 
     metadata = {"render_modes": []}
 
-    def __init__(
-        self,
-        scenario,
-        start,
-        *,
-        reward=None,
-        terminated=None,
-        step_s=0.01,
-        interval_s=0.005,
-        max_velocity=1.0,
-        max_angular_velocity=1.0,
-        observation="voxels",
-        bins=5,
-        tau_s=0.03,
-        overrides=None,
-        threads=0,
-    ):
-        self._view = View(scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, tau_s, overrides)
+    def __init__(self, scenario, start, *, reward=None, terminated=None, threads=0, **view):
+        self._view = View(scenario, start, threads, **view)
         self.observation_space, self.action_space = self._view.observation_space, self._view.action_space
         self._reward, self._terminated, self._threads = reward, terminated, threads
         self._simulation = None
@@ -88,7 +72,7 @@ class EventEnv(gymnasium.Env):
         self.close()
         self.pose = self._view.draw_start(self.np_random)
         self._seen = dict(self._view.blank)
-        self._simulation = self._view.begin(self.pose, int(self.np_random.integers(2**32)), threads=self._threads)
+        self._simulation = self._view.begin(self.pose, int(self.np_random.integers(2**32)), self._threads)
         self._t = self._known_until = self._simulation.start
         return self._observe([])
 

@@ -6,7 +6,7 @@ from gymnasium.vector.utils import batch_space, concatenate, create_empty_array
 
 from .. import _checks, _core
 from .._errors import Error
-from .._simulate import Packet
+from .._simulation import Packet
 from ._view import View
 
 
@@ -21,7 +21,7 @@ class EventVectorEnv(gymnasium.vector.VectorEnv):
     Parameters
     ----------
     num_envs : int
-    scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, tau_s, overrides, threads
+    scenario, start, and all others
         As of `EventEnv`.
     reward : callable, optional
         `reward(env, infos)`: floats, shape (num_envs,). Default: 0.
@@ -31,31 +31,13 @@ class EventVectorEnv(gymnasium.vector.VectorEnv):
 
     metadata = {"render_modes": [], "autoreset_mode": gymnasium.vector.AutoresetMode.NEXT_STEP}
 
-    def __init__(
-        self,
-        num_envs,
-        scenario,
-        start,
-        *,
-        reward=None,
-        terminated=None,
-        step_s=0.01,
-        interval_s=0.005,
-        max_velocity=1.0,
-        max_angular_velocity=1.0,
-        observation="voxels",
-        bins=5,
-        tau_s=0.03,
-        overrides=None,
-        threads=0,
-    ):
+    def __init__(self, num_envs, scenario, start, *, reward=None, terminated=None, threads=0, **view):
         self.num_envs = _checks.whole(num_envs, "num_envs", 1, 100_000)
-        self._view = View(scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, tau_s, overrides)
+        self._view = View(scenario, start, threads, **view)
         self.single_observation_space, self.single_action_space = self._view.observation_space, self._view.action_space
         self.observation_space = batch_space(self.single_observation_space, self.num_envs)
         self.action_space = batch_space(self.single_action_space, self.num_envs)
         self._reward, self._terminated = reward, terminated
-        self._scene = self._view.share_scene(_checks.threads(threads))
         self._simulations = [None] * self.num_envs
         self._randoms = [None] * self.num_envs
         self._seen = [{} for _ in range(self.num_envs)]
@@ -69,7 +51,7 @@ class EventVectorEnv(gymnasium.vector.VectorEnv):
             self._simulations[i].close()
         random = self._randoms[i]
         self.pose[i] = self._view.draw_start(random)
-        simulation = self._view.begin(self.pose[i], int(random.integers(2**32)), threads=1, scene=self._scene)
+        simulation = self._view.begin(self.pose[i], int(random.integers(2**32)), 1)
         self._simulations[i] = simulation
         self._seen[i] = dict(self._view.blank)
         self._t[i] = self._known_until[i] = simulation.start
@@ -105,16 +87,16 @@ class EventVectorEnv(gymnasium.vector.VectorEnv):
         """Moves all bodies for step_s, except those whose episode has ended: these begin again."""
         if self._simulations[0] is None:
             raise Error("reset() comes before step()")
+        paths = self._view.move(self.pose, actions)
         fresh = self._over.copy()
         for i in np.flatnonzero(fresh):
             self._begin(i)
         moving = np.flatnonzero(~fresh)
         packets = [[] for _ in range(self.num_envs)]
         if len(moving):
-            poses = self._view.move(self.pose[moving], np.asarray(actions)[moving])
             simulations = [self._simulations[i] for i in moving]
-            made = _core.step_together([simulation._core for simulation in simulations], poses, self._scene)
-            for i, simulation, path, own in zip(moving, simulations, poses, made):
+            made = _core.step_together([simulation._core for simulation in simulations], paths[moving], self._view.scene)
+            for i, simulation, path, own in zip(moving, simulations, paths[moving], made):
                 self.pose[i] = path[-1]
                 self._t[i] = simulation._moved(len(path))
                 packets[i] = [Packet(parts, simulation.cameras) for parts in own]

@@ -8,7 +8,7 @@ from .._errors import Error
 from .._events import Events
 from .._represent import event_count, time_surface, voxel_grid
 from .._scenario import to_overrides, to_scenario
-from .._simulate import begin_live
+from .._simulation import begin_live
 from .._types import EVENT_DTYPE
 
 
@@ -26,10 +26,22 @@ OBSERVATIONS = ("voxels", "counts", "time_surface", "depth", "motion_field", "im
 
 
 class View:
-    """The arguments of an environment, checked."""
+    """The arguments of an environment, checked, and its scene, which all its simulations share."""
 
     def __init__(
-        self, scenario, start, step_s, interval_s, max_velocity, max_angular_velocity, observation, bins, tau_s, overrides
+        self,
+        scenario,
+        start,
+        threads,
+        *,
+        step_s=0.01,
+        interval_s=0.005,
+        max_velocity=1.0,
+        max_angular_velocity=1.0,
+        observation="voxels",
+        bins=5,
+        tau_s=0.03,
+        overrides=None,
     ):
         self.scenario, self.overrides, self.start = to_scenario(scenario), overrides, start
         self.step_s = _checks.number(step_s, "step_s", above=0)
@@ -44,7 +56,9 @@ class View:
         self.names = [_checks.one_of(name, "observation", OBSERVATIONS) for name in ([observation] if self.alone else observation)]
         self.bins = _checks.whole(bins, "bins", 1, 1000)
         self.tau_s = _checks.seconds(tau_s, "tau_s", above=0)
-        with self.begin(self.draw_start(np.random.default_rng(0)), 0) as simulation:
+        values = self.scenario._read(to_overrides(overrides), True, False)
+        self.scene = _core.SharedScene(values, _checks.threads(threads))
+        with self.begin(self.draw_start(np.random.default_rng(0)), 0, 1) as simulation:
             (camera,) = simulation.cameras.values()
         if camera["sensors"]:
             raise Error("the scenario has several event sensors: name one in event_camera")
@@ -71,19 +85,25 @@ class View:
         """The pose at the start of an episode."""
         return np.array(self.start(random) if callable(self.start) else self.start, np.float64)
 
-    def begin(self, pose, seed, **options):
+    def begin(self, pose, seed, threads):
         """A live simulation."""
         return begin_live(
-            self.scenario, pose, interval_s=self.interval_s, packet_s=self.step_s, overrides=self.overrides, seed=seed, **options
+            self.scenario,
+            pose,
+            interval_s=self.interval_s,
+            packet_s=self.step_s,
+            overrides=self.overrides,
+            seed=seed,
+            threads=threads,
+            scene=self.scene,
         )
-
-    def share_scene(self, threads):
-        """The scene, for several simulations on so many threads."""
-        return _core.SharedScene(self.scenario._read(to_overrides(self.overrides), True, False), threads)
 
     def move(self, poses, actions):
         """The poses of a step, (N, self.poses, 4, 4), from poses (N, 4, 4) on: constant velocities in the bodies' frames."""
-        twists = np.clip(np.asarray(actions, np.float64), -1, 1) * self.limits
+        actions = np.asarray(actions, np.float64)
+        if actions.shape != (len(poses), 6) or not np.isfinite(actions).all():
+            raise Error(f"actions must be 6 finite numbers for each body, not {actions}")
+        twists = np.clip(actions, -1, 1) * self.limits
         turns = rotation(self.interval_s * twists[:, 3:])
         moved = np.empty((len(poses), self.poses, 4, 4))
         for k in range(self.poses):

@@ -118,7 +118,7 @@ void bind_simulation(nb::module_& module) {
   nb::class_<SharedScene>(module, "SharedScene")
       .def("__init__", [](SharedScene* self, const CheckedScenario& scenario, int threads) {
         const nb::gil_scoped_release released;
-        const NoticeHandler ignore = [](const std::string&) {};  // each simulation gives them
+        const NoticeHandler ignore = [](const std::string&) {};  // of the scene; simulations give the others
         new (self) SharedScene{load_scene(scenario.value, {ignore, ignore}), std::make_unique<const Workers>(threads)};
       });
   module.def("step_together", &step_together, nb::arg("simulations"), nb::arg("poses"), nb::arg("scene"));

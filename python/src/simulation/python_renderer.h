@@ -23,7 +23,7 @@ class PythonFunction {
 };
 
 /// A renderer that calls Python for complete images: `render(t, T_world_camera, T_world_objects, shape)` returns
-/// irradiance and depth, and optionally motion_field and object. _simulate.py checks them.
+/// irradiance and depth, and optionally motion_field and object. _simulation/_simulate.py checks them.
 std::unique_ptr<Renderer> make_python_renderer(const PythonFunction& render, const Camera& camera);
 
 }  // namespace esim::python

@@ -1,5 +1,7 @@
 """An environment for one agent."""
 
+from copy import deepcopy
+
 import gymnasium
 
 from .._errors import Error
@@ -64,7 +66,7 @@ class EventEnv(gymnasium.Env):
         if packets:
             self._known_until = packets[-1].t1
         info = {"t": self._t, "known_until": self._known_until, "pose": self.pose.copy()}
-        return self._view.observe(self._seen, self.events, packets, self.pose), info
+        return deepcopy(self._view.observe(self._seen, self.events, packets, self.pose)), info
 
     def reset(self, *, seed=None, options=None):
         """Begins an episode with a sensor of its own: its noise follows from `seed`."""

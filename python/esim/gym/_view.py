@@ -122,7 +122,7 @@ class View:
         return np.concatenate([none, *(packet.events for packet in packets)])
 
     def observe(self, seen, events, packets, pose):
-        """The observation. `seen`: what the agent saw last, by name; is replaced by what it sees now."""
+        """The observation, to be copied. `seen`: what the agent saw last, by name; is replaced by what it sees now."""
         span = {"t0": _checks.ns(packets[0].t0), "t1": _checks.ns(packets[-1].t1)} if packets else {}
         for name in self.names:
             if name == "counts":
@@ -140,4 +140,4 @@ class View:
                 elif name == "imu" and len(packet.imu):
                     last = packet.imu[-1]
                     seen[name] = np.concatenate([last["angular_rate"], last["specific_force"]]).astype(np.float32)
-        return seen[self.names[0]].copy() if self.alone else {name: seen[name].copy() for name in self.names}
+        return seen[self.names[0]] if self.alone else {name: seen[name] for name in self.names}

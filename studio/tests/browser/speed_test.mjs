@@ -5,8 +5,8 @@ import { writeFileSync } from "node:fs";
 import { cpus, loadavg } from "node:os";
 import { join } from "node:path";
 import { after, test } from "node:test";
-import { chromiumOrSkip, makeFiles, openPage, Server, until } from "./harness.mjs";
-import { press, ready, rows, shot, stage, yaml as textOf } from "./page.mjs";
+import { chromiumOrSkip, esim, makeFiles, openPage, Server, until } from "./harness.mjs";
+import { press, ready, rows, shot, stage, visit, yaml as textOf } from "./page.mjs";
 
 const browser = await chromiumOrSkip();
 const files = makeFiles();
@@ -147,4 +147,24 @@ test("half a million triangles: flown through in few, rested on in all, picked e
   assert.ok(Math.abs(z - height(x, y)) < 0.01, `(${x}, ${y}, ${z}) is on the surface, at ${height(x, y)}`);
   await until(async () => (await corners()) === all, "all triangles again");
   await end();
+});
+
+test("events of a changed sensor come within a second", async (context) => {
+  esim("simulate", join(files.folder, "walk.yaml"), "--out", join(files.folder, "kept"), "--set", "output.samples=true");
+  const server = new Server(files.folder);
+  servers.push(server);
+  await server.start("walk.yaml");
+  const { page } = await openPage(browser, server);
+  await page.goto(server.url);
+  await ready(page);
+  await visit(page, server, "#/look?recording=project/kept");
+  await page.getByText("Change the sensor").click();
+  const threshold = page.locator(".sensor-form").getByLabel("event_camera.contrast_threshold", { exact: true });
+  await threshold.fill("0.1");
+  const begin = Date.now();
+  await threshold.press("Enter");
+  const caption = page.locator(".look figcaption").first();
+  await until(async () => /of the changed sensor/.test(await caption.textContent()), "the new events");
+  const took_ms = Date.now() - begin;
+  expectQuick(context, took_ms < 1000, `new events after ${took_ms} ms`);
 });

@@ -46,8 +46,7 @@ test("the browser is closed in mid-run: the run goes on, and is joined again", a
 test("what a run is writing cannot be replaced", async () => {
   const { page } = state;
   await visit(page, server, "#/run?scenario=project/long.yaml");
-  await page.waitForSelector(".run");
-  await page.keyboard.press("Control+Enter");
+  await page.getByRole("button", { name: "Run", exact: true }).click();
   await page.locator("dialog").waitFor();
   assert.match(await page.locator("dialog").textContent(), /A run is writing there/);
   assert.equal(await page.getByRole("button", { name: "Replace it" }).count(), 0);
@@ -104,8 +103,7 @@ test("a run that fails for an option leads back to it", async () => {
   );
   const { page, faults, context } = await enter();
   await visit(page, server, "#/run?scenario=project/one.yaml");
-  await page.waitForSelector(".run");
-  await page.keyboard.press("Control+Enter");
+  await page.getByRole("button", { name: "Run", exact: true }).click();
   await until(async () => /failed/.test(await figures(page)), "the failure");
   assert.deepEqual(await colouredPixels(page, ".run-picture"), { on: 0, off: 0 }, "no picture of another run");
   await shot(page, "run-failed-dark");

@@ -12,6 +12,7 @@
 
 #include "esim/core/error.h"
 #include "esim/core/parallel.h"
+#include "esim/evaluate/realism/real_frame.h"
 #include "esim/evaluate/realism/real_recordings.h"
 #include "esim/event_camera/event_camera.h"
 #include "esim/files/codecs/image_codecs.h"
@@ -88,11 +89,47 @@ TEST(Realism, TheFrameMovesAlongTheFlow) {
   const Image<float> middle = clip.image_at(0.05), end = clip.image_at(0.1), begin = clip.image_at(0);
   for (int y = 8; y < kHeight - 8; ++y) {
     for (int x = 8; x < kWidth - 8; ++x) {
-      EXPECT_EQ(middle(x, y), clip.frame(x, y));
-      // Half of (6, -3) px before and after the middle: whole pixels in x, half pixels in y.
-      EXPECT_NEAR(begin(x - 6, y + 3), end(x, y), 1e-6F);
+      EXPECT_NEAR(middle(x, y), clip.frame.scene(x, y) * clip.frame.vignetting(x, y), 1e-6F);
+      // Half of (6, -3) px before and after the middle: whole pixels in x, half pixels in y. Vignetting does not move.
+      const Image<float>& vignetting = clip.frame.vignetting;
+      EXPECT_NEAR(begin(x - 6, y + 3) / vignetting(x - 6, y + 3), end(x, y) / vignetting(x, y), 1e-6F);
     }
   }
+}
+
+/// A black square on grey, under a lens that darkens the corners, with noise and a black line at the border.
+TEST(Realism, FramesLoseBorderVignettingAndNoise) {
+  constexpr int kSize = 100;
+  std::mt19937 random(5);
+  std::normal_distribution<double> noise(0, 1.5);
+  const auto vignetting = [](int x, int y) {
+    const double u = 2.0 * x / kSize - 1, v = 2.0 * y / kSize - 1;
+    return std::exp(-0.2 * (u * u + v * v) + 0.1 * u);
+  };
+  const auto is_black = [](int x, int y) { return x >= 30 && x < 60 && y >= 40 && y < 70; };
+  std::vector<std::uint8_t> grey(kSize * kSize);
+  for (int y = 1; y < kSize - 1; ++y) {
+    for (int x = 1; x < kSize - 1; ++x)
+      grey[static_cast<std::size_t>(y * kSize + x)] = static_cast<std::uint8_t>(
+          std::clamp((is_black(x, y) ? 10 : 150) * vignetting(x, y) + noise(random), 0.0, 255.0));
+  }
+  const test::TemporaryDirectory folder;
+  write_file(folder.path() / "frame.png", encode_png({grey.data(), kSize, kSize, kSize}, PngEffort::small));
+  const RealFrame frame = read_real_frame(folder.path() / "frame.png", kSize, kSize);
+  const float middle = frame.scene(80, 20);
+  double squares = 0, pixels = 0;
+  for (int y = 0; y < kSize; ++y) {
+    for (int x = 0; x < kSize; ++x) {
+      EXPECT_NEAR(frame.vignetting(x, y) / vignetting(x, y), 1, 0.02) << x << ' ' << y;
+      if (is_black(x, y)) {
+        EXPECT_LT(frame.scene(x, y), 0.15F * middle) << x << ' ' << y;
+      } else {
+        EXPECT_NEAR(frame.scene(x, y) / middle, 1, 0.03) << x << ' ' << y;
+        squares += std::pow(static_cast<double>(frame.scene(x, y) / middle) - 1, 2), ++pixels;
+      }
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / pixels), 0.004);  // 1.5 / 150 before
 }
 
 TEST(Realism, TimesAreWholeMicrosecondsButForRounding) {
@@ -171,17 +208,17 @@ TEST(Realism, AReadoutOfRowsIsFitted) {
   EventCameraOptions sensor = preset_options("davis240c");
   sensor.contrast_threshold = 0.1, sensor.hot_pixels = 0, sensor.circuit->noise = 0;
   sensor.readout = {};
-  sensor.readout.time_stamp_us = 1, sensor.readout.row_scan_us = 10.0 / kHeight;
+  sensor.readout.time_stamp_us = 1, sensor.readout.row_wait_us = 10;
   record(folder.path() / "clip", sensor);
   EventCameraOptions base = sensor;
   base.readout = {};
   RealismOptions options;
-  options.frame_step_s = 1e-3;
+  options.frame_step_s = 1e-3, options.history_s = 0.03;
   options.fit_to = ClipPart{"clip", 0, 0.6};
   const RealismEvaluation found = evaluate_realism(folder.path(), {{"base", base, {}}}, options, {});
   const ReadoutOptions& readout = found.fitted.at(0).fit.options.readout;
   EXPECT_EQ(readout.time_stamp_us, 1);
-  EXPECT_NEAR(readout.row_scan_us, 10.0 / kHeight, 6.0 / kHeight);
+  EXPECT_NEAR(readout.row_wait_us, 10, 4);
   EXPECT_LT(found.clips[1].sum_of_deviations(), 0.7 * found.clips[0].sum_of_deviations());
 }
 
@@ -203,9 +240,9 @@ TEST(Realism, OtherProgramsGetTheFramesAndWriteEvents) {
   const test::TemporaryDirectory folder;
   write_scene(folder.path());
   record(folder.path(), usual_sensor());
-  // This program writes the real events, 30 ms later: there, its frames begin.
+  // This program writes the real events, 2 s later: its history begin there.
   const std::string script =
-      "test -f {frames}/00000.png && test -f {frames}/images.csv && awk '{print $1 - 10 + 0.03, "
+      "test -f {frames}/00000.png && test -f {frames}/images.csv && awk '{print $1 - 10 + 2, "
       "$2, $3, $4}' '" +
       (folder.path() / "events.txt").string() + "' > {events}";
   const RealismEvaluation found = evaluate_realism(folder.path(), {{"copy", {}, script}}, {}, {});

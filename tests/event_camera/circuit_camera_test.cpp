@@ -2,15 +2,18 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <map>
 #include <numbers>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include "esim/core/error.h"
 #include "esim/event_camera/event_camera.h"
+#include "esim/stats/sensor/sensor_statistics.h"
 #include "support/errors.h"
 
 namespace esim {
@@ -76,7 +79,8 @@ Light moving_waves() {
 TEST(CircuitCamera, ThreadsAndTilesDoNotChangeItsEvents) {
   for (const bool has_readout : {false, true}) {
     EventCameraOptions options = filtered();
-    if (has_readout) options.readout = {.rate_mev_per_s = 2, .row_time_us = 1, .row_scan_us = 0.5, .row_rest_us = 3};
+    if (has_readout)
+      options.readout = {.rate_mev_per_s = 2, .row_time_us = 1, .row_wait_us = 20, .column_coupling = 0.7};
     const std::vector<Event> expected = events_of(options, moving_waves(), 500, 1);
     ASSERT_GT(expected.size(), 2000U);
     EXPECT_EQ(events_of(options, moving_waves(), 500, 1, 3), expected);
@@ -231,21 +235,51 @@ TEST(CircuitCamera, NoiseAlternatesInTheDarkAndFallsSilentInLight) {
   EXPECT_LT(light_hz, 1e-3);
 }
 
-TEST(CircuitCamera, RowsAreReadAtOneTimeAndRest) {
+SensorStatistics statistics_of(const std::vector<Event>& events) {
+  SensorStatisticsCounter counter(SensorSize{kWidth, kHeight});
+  counter.add(events);
+  return std::move(counter).finish();
+}
+
+TEST(CircuitCamera, RowsAreReadSomeTimeAfterTheirFirstRequest) {
   EventCameraOptions options = dim();
-  options.readout = {.rate_mev_per_s = 5, .row_time_us = 0.3, .row_scan_us = 0.2, .row_rest_us = 200};
-  const std::vector<Event> events = events_of(options, moving_waves(), 500, 1);
-  std::map<int, TimeNs> last;
-  std::size_t shared = 0;
-  for (const Event& e : events) {
-    const auto found = last.find(e.y);
-    if (found != last.end() && found->second == e.t) ++shared;
-    if (found != last.end() && found->second != e.t) {
-      EXPECT_GE(e.t - found->second, 200 * kNsPerUs);
+  options.readout = {.row_time_us = 0.3, .time_stamp_us = 1};
+  const SensorStatistics at_once = statistics_of(events_of(options, moving_waves(), 500, 5));
+  options.readout.row_wait_us = 8;
+  const SensorStatistics waiting = statistics_of(events_of(options, moving_waves(), 500, 5));
+  ASSERT_GT(waiting.events, 20'000U);
+  EXPECT_LT(std::abs(at_once.row_wait.mean_us), 1 + 4 * at_once.row_wait.deviation_us);
+  ASSERT_LT(waiting.row_wait.deviation_us, 1);
+  const double rows = 1e-6 * static_cast<double>(waiting.events) / waiting.duration_s * 8;  // that wait
+  EXPECT_NEAR(waiting.row_wait.mean_us, 8 * (1 + rows / 16), 0.5 + 4 * waiting.row_wait.deviation_us);
+  EXPECT_GT(waiting.same_us.row_over_chance(kHeight), 4 * at_once.same_us.row_over_chance(kHeight));
+  // As many events: a few us of waiting do not matter for a refractory period of 300 us.
+  EXPECT_NEAR(static_cast<double>(waiting.events), static_cast<double>(at_once.events),
+              0.03 * static_cast<double>(at_once.events));
+}
+
+/// Pairs of events of a column in different rows, the second 0 or 1 us after the first, by the second one's polarity.
+std::array<int, 2> pairs_of_columns(const std::vector<Event>& events) {
+  std::array<int, 2> pairs{};
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    for (std::size_t j = i + 1; j < events.size() && events[j].t <= events[i].t + kNsPerUs; ++j) {
+      if (events[i].x == events[j].x && events[i].y != events[j].y) ++pairs[events[j].polarity > 0 ? 1 : 0];
     }
-    last[e.y] = e.t;
   }
-  EXPECT_GT(shared, events.size() / 100);
+  return pairs;
+}
+
+TEST(CircuitCamera, ColumnsCallTheRowsOfWaitingOnEvents) {
+  EventCameraOptions options = dim();
+  options.readout = {.row_time_us = 0.3, .row_wait_us = 12, .time_stamp_us = 1};
+  const auto [off_alone, on_alone] = pairs_of_columns(events_of(options, moving_waves(), 500, 5));
+  options.readout.column_coupling = 1;
+  const auto [off, on] = pairs_of_columns(events_of(options, moving_waves(), 500, 5));
+  ASSERT_GT(on_alone, 20);
+  EXPECT_GT(on, 3 * on_alone);
+  // OFF events are not called, but share the time of rows that are.
+  EXPECT_LT(off, on_alone + (on - on_alone) / 2);
+  EXPECT_GT(off_alone, 0);
 }
 
 TEST(CircuitCamera, ScansStampByColumnAndScan) {

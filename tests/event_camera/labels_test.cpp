@@ -158,16 +158,17 @@ std::vector<EventCameraOptions> with_readouts() {
 
 std::vector<EventCameraOptions> circuits() {
   const EventCameraOptions circuit = dim_circuit();
-  return {
-      circuit,
-      with(circuit, [](auto& o) { o.circuit->noise = 0; }),
-      with(circuit, [](auto& o) { o.refractory_period_us = 0; }),
-      with(circuit,
-           [](auto& o) { o.readout = {.rate_mev_per_s = 2, .row_time_us = 1, .row_scan_us = 0.5, .row_rest_us = 3}; }),
-      with(circuit, [](auto& o) { o.readout = {.scan_period_us = 200}; }),
-      with(circuit, [](auto& o) { o.readout = {.scan_period_us = 200, .time_stamp_us = 7}; }),
-      with(circuit, [](auto& o) { o.readout = {.rate_mev_per_s = 2, .row_time_us = 1, .time_stamp_us = 1}; }),
-      with(circuit, [](auto& o) { o.circuit->max_rate_hz = 200; })};
+  return {circuit,
+          with(circuit, [](auto& o) { o.circuit->noise = 0; }),
+          with(circuit, [](auto& o) { o.refractory_period_us = 0; }),
+          with(circuit,
+               [](auto& o) {
+                 o.readout = {.rate_mev_per_s = 2, .row_time_us = 1, .row_wait_us = 20, .column_coupling = 0.7};
+               }),
+          with(circuit, [](auto& o) { o.readout = {.scan_period_us = 200}; }),
+          with(circuit, [](auto& o) { o.readout = {.scan_period_us = 200, .time_stamp_us = 7}; }),
+          with(circuit, [](auto& o) { o.readout = {.rate_mev_per_s = 2, .row_time_us = 1, .time_stamp_us = 1}; }),
+          with(circuit, [](auto& o) { o.circuit->max_rate_hz = 200; })};
 }
 
 std::vector<EventCameraOptions> all_cameras() {

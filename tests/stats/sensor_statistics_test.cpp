@@ -173,6 +173,39 @@ TEST(SensorStatistics, SeeRowsThatAreReadTogetherAndThenRest) {
   EXPECT_EQ(s.after.row_over_chance(kHeight), 0);
 }
 
+/// Each row is read a random time after its first event, at which its events get one time stamp.
+std::vector<Event> read_by_rows(const std::vector<Event>& events, double least_us, double most_us) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> wait_us(least_us, most_us);
+  std::vector<TimeNs> read_at(kHeight, -1);
+  std::vector<Event> read;
+  for (const Event& event : events) {
+    TimeNs& t = read_at[event.y];
+    if (event.t > t) t = event.t + static_cast<TimeNs>(1000 * wait_us(random));
+    read.push_back({(t / kNsPerUs + 1) * kNsPerUs, event.x, event.y, event.polarity});
+  }
+  std::sort(read.begin(), read.end());
+  return read;
+}
+
+TEST(SensorStatistics, FindHowLongRowsWait) {
+  // Of the pairs that a wait w hides, the events that have joined a reading hide a few themselves: w (1 - rate w / 2).
+  constexpr double kFound_us = 8 * (1 - 2e5 / kHeight * 8e-6 / 2);
+  int inside = 0;
+  for (unsigned seed = 0; seed < 40; ++seed) {
+    const std::vector<Event> events = poisson_events(2e5, 0.5, 100 + seed);
+    const RowPairs::Wait wait = statistics_of(read_by_rows(events, 4, 12)).row_wait;
+    EXPECT_NEAR(wait.mean_us, 8, 2);
+    inside += std::abs(wait.mean_us - kFound_us) < 2 * wait.deviation_us ? 1 : 0;
+  }
+  EXPECT_GE(inside, 33);  // 38 of 40 for normal errors; 2 % of 40 binomials are below 35
+
+  const RowPairs::Wait none = statistics_of(poisson_events(2e5, 0.5, 9)).row_wait;
+  EXPECT_LT(std::abs(none.mean_us), 4 * none.deviation_us);
+  EXPECT_TRUE(std::isnan(statistics_of(poisson_events(1e3, 0.5, 9)).row_wait.mean_us));
+  EXPECT_TRUE(std::isnan(statistics_of(read_by_rows(poisson_events(2e5, 0.5, 9), 60, 90)).row_wait.mean_us));
+}
+
 TEST(SensorStatistics, FindTheNoiseBesideMotion) {
   // An edge crosses columns 0 to 15 again and again; all pixels fire at 2 Hz.
   constexpr double kDuration = 10;

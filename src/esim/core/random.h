@@ -29,6 +29,7 @@ enum class Purpose : std::uint16_t {
   circuit_start = 26,
   resampling = 27,
   sensor_choice = 28,
+  circuit_readout = 29,
   test = 1000,
 };
 

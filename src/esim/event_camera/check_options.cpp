@@ -52,8 +52,8 @@ void refuse_without_circuit(const char* name, double value) {
 void check(const EventCameraOptions& o) {
   check_ranges("readout", o.readout);
   if (!o.circuit) {
-    refuse_without_circuit("row_scan_us", o.readout.row_scan_us);
-    refuse_without_circuit("row_rest_us", o.readout.row_rest_us);
+    refuse_without_circuit("row_wait_us", o.readout.row_wait_us);
+    refuse_without_circuit("column_coupling", o.readout.column_coupling);
     refuse_without_circuit("scan_period_us", o.readout.scan_period_us);
     refuse_without_circuit("time_stamp_us", o.readout.time_stamp_us);
     return;

@@ -54,7 +54,8 @@ struct EventCamera::State {
     if (options.circuit) circuit.emplace(options, width, height, seed, stream);
     if (options.surround_px > 0) surround.emplace(options.surround_px, options.surround_ms * 1e-3, width, height);
     if (!options.circuit && options.readout.limited()) readout.emplace(options, width, height);
-    if (options.circuit && options.readout.acknowledges()) circuit_readout.emplace(options.readout, width, height);
+    if (options.circuit && options.readout.acknowledges())
+      circuit_readout.emplace(options.readout, width, height, seed, stream);
     if (options.labels) labels.emplace(width, height, circuit ? circuit->hot() : pixels.hot(seed, stream));
     if (options.filters.any()) filters.emplace(options.filters, width, height);
   }

@@ -51,17 +51,17 @@ struct ReadoutOptions {
   double rate_mev_per_s = 0.0;
   double row_time_us = 0.0;
   int queue_events = 0;
-  double row_scan_us = 0.0;
-  double row_rest_us = 0.0;
+  double row_wait_us = 0.0;
+  double column_coupling = 0.0;
   double scan_period_us = 0.0;
   bool scan_hold = false;
   double time_stamp_us = 0.0;
 
+  static constexpr double kRowsOfDoubleWait = 16;  ///< rows that wait when a row waits for 2 row_wait_us
+
   bool limited() const { return rate_mev_per_s > 0 || row_time_us > 0; }
   /// Whether the pixels wait for it.
-  bool acknowledges() const {
-    return limited() || row_scan_us > 0 || row_rest_us > 0 || scan_period_us > 0 || time_stamp_us > 0;
-  }
+  bool acknowledges() const { return limited() || row_wait_us > 0 || scan_period_us > 0 || time_stamp_us > 0; }
 };
 
 /// The circuit of the pixels before their comparators: photodiode, photoreceptor and source follower, with the shot
@@ -190,10 +190,13 @@ void describe(Visitor& visit, ReadoutOptions& o) {
   visit(
       "queue_events", o.queue_events,
       About{"maximum number of waiting events; further events are dropped and counted; 0: one per pixel", "", 0, 1e9});
-  visit("row_scan_us", o.row_scan_us,
-        About{"with circuit: time in which the arbiter passes a row without requests; it visits the rows in turn", "us",
+  visit("row_wait_us", o.row_wait_us,
+        About{"with circuit: mean time from the first request of a row until it is read, if no other row waits", "us",
               0, 1e6});
-  visit("row_rest_us", o.row_rest_us, About{"with circuit: minimum time between two readings of a row", "us", 0, 1e6});
+  visit("column_coupling", o.column_coupling,
+        About{"with circuit: probability with which an event that is read calls the rows of ON events that wait in its "
+              "column",
+              "", 0, 1});
   visit("scan_period_us", o.scan_period_us,
         About{"with circuit: period in which all columns are read one after the other; 0: rows are read on request",
               "us", 0, 1e6});

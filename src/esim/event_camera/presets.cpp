@@ -70,16 +70,16 @@ EventCameraOptions dvs128_by_circuit() {
 EventCameraOptions davis240c_by_circuit() {
   EventCameraOptions o = by_circuit(30, 1, 3000);
   o.contrast_threshold = 0.55;
-  o.threshold_ratio = 0.87;
+  o.threshold_ratio = 0.85;
   o.threshold_mismatch = 0.02;
   o.circuit->threshold_mismatch_common = 0.07;
   o.circuit->frame_coupling = 0.03;
-  o.refractory_period_us = 1450;
+  o.refractory_period_us = 1300;
   o.leak_rate_hz = 0.02;
   o.readout.rate_mev_per_s = 10;
-  o.readout.row_time_us = 0.61;
-  o.readout.row_scan_us = 0.003;
-  o.readout.row_rest_us = 6;
+  o.readout.row_time_us = 0.2;
+  o.readout.row_wait_us = 6;
+  o.readout.column_coupling = 1;
   o.readout.time_stamp_us = 1;
   return o;
 }
@@ -94,8 +94,8 @@ EventCameraOptions davis346_by_circuit() {
   o.leak_rate_hz = 0.2;
   o.readout.rate_mev_per_s = 12;
   o.readout.row_time_us = 0.08;
-  o.readout.row_scan_us = 0.003;
-  o.readout.row_rest_us = 6;
+  o.readout.row_wait_us = 6;
+  o.readout.column_coupling = 1;
   o.readout.time_stamp_us = 1;
   return o;
 }

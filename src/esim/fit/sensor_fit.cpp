@@ -15,6 +15,7 @@
 #include "esim/fit/circuit/circuit_fit.h"
 #include "esim/fit/contrast_fit.h"
 #include "esim/fit/image_stream.h"
+#include "esim/fit/row_wait.h"
 #include "esim/fit/shortest_intervals.h"
 #include "esim/formats/events_file.h"
 #include "esim/formats/formats.h"
@@ -379,6 +380,8 @@ class Fitter {
                                               period_us + error_us, "time stamps of the columns");
       base_.circuit ? add(period) : fit_.observations.push_back(period);
     }
+    if (const std::optional<Estimate> wait = find_row_wait(*busiest))
+      base_.circuit ? add(*wait) : fit_.observations.push_back(*wait);
     const double rows = busiest->same_us.row_over_chance(fit_.sensor.height);
     if (rows > kClearRows) {
       fit_.notes.push_back(

@@ -22,7 +22,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr double kBlur_px = 0.4, kDarkest = 2.0 / 255;
+constexpr double kReach = 2;  // of the interpolation, px
 constexpr const char* kPositive = "noise_pos_";
 constexpr std::uint64_t kMostNumbers = 1U << 28;
 
@@ -47,55 +47,13 @@ Array read_doubles(const fs::path& path) {
   return array;
 }
 
-/// Grey values from 0 to 1 of the sensor's part of a picture.
-Image<float> read_frame(const fs::path& path, int width, int height) {
-  ImagePixels pixels;
-  InputFile file(path);
-  if (!decode_image(file.read_exactly(file.size(), "the image"), pixels) || pixels.bits != 8)
-    throw UserError(path.string() + ": must be a PNG image of 8 bits");
-  const int top = pixels.height >= 2 * height ? height : 0;
-  if (pixels.width < width || pixels.height < height) {
-    throw UserError(fmt::format("{}: {} x {} px is less than the sensor of {} x {} px", path.string(), pixels.width,
-                                pixels.height, width, height));
-  }
-  Image<float> frame(width, height);
-  for (int y = 0; y < height; ++y) {
-    const std::uint8_t* const row = pixels.row(top + y);
-    for (int x = 0; x < width; ++x) {
-      const std::uint8_t* const p = row + static_cast<std::ptrdiff_t>(x) * pixels.channels;
-      const float grey = pixels.channels < 3 ? static_cast<float>(p[0])
-                                             : 0.299F * static_cast<float>(p[0]) + 0.587F * static_cast<float>(p[1]) +
-                                                   0.114F * static_cast<float>(p[2]);
-      frame(x, y) = grey / 255;
-    }
-  }
-  return frame;
+/// The index of what a mirror at both ends shows at i.
+int mirrored(int i, int size) {
+  const int period = 2 * size, at = (i % period + period) % period;
+  return at < size ? at : period - 1 - at;
 }
 
-/// A Gaussian filter; the border repeats.
-Image<float> blurred(const Image<float>& image, double deviation) {
-  const int reach = static_cast<int>(std::ceil(4 * deviation));
-  std::vector<double> weights;
-  double sum = 0;
-  for (int k = -reach; k <= reach; ++k) sum += weights.emplace_back(std::exp(-0.5 * k * k / (deviation * deviation)));
-  const auto filter = [&](const Image<float>& from, int dx, int dy) {
-    Image<float> to(from.width(), from.height());
-    for (int y = 0; y < from.height(); ++y) {
-      for (int x = 0; x < from.width(); ++x) {
-        double value = 0;
-        for (int k = -reach; k <= reach; ++k) {
-          const int u = std::clamp(x + k * dx, 0, from.width() - 1), v = std::clamp(y + k * dy, 0, from.height() - 1);
-          value += weights[static_cast<std::size_t>(k + reach)] * static_cast<double>(from(u, v));
-        }
-        to(x, y) = static_cast<float>(value / sum);
-      }
-    }
-    return to;
-  };
-  return filter(filter(image, 1, 0), 0, 1);
-}
-
-/// Catmull and Rom's cubic, whose third-order accuracy keeps moving textures free of steps; the border repeats.
+/// Catmull and Rom's cubic, whose third-order accuracy keeps moving textures free of steps.
 double cubic_value(const Image<float>& image, double x, double y) {
   const double left = std::floor(x), top = std::floor(y);
   const auto weights = [](double u) {
@@ -105,9 +63,9 @@ double cubic_value(const Image<float>& image, double x, double y) {
   const auto wx = weights(x - left), wy = weights(y - top);
   double sum = 0;
   for (int j = 0; j < 4; ++j) {
-    const int v = std::clamp(static_cast<int>(top) + j - 1, 0, image.height() - 1);
+    const int v = mirrored(static_cast<int>(top) + j - 1, image.height());
     for (int i = 0; i < 4; ++i) {
-      const int u = std::clamp(static_cast<int>(left) + i - 1, 0, image.width() - 1);
+      const int u = mirrored(static_cast<int>(left) + i - 1, image.width());
       sum += wx[static_cast<std::size_t>(i)] * wy[static_cast<std::size_t>(j)] * static_cast<double>(image(u, v));
     }
   }
@@ -158,15 +116,47 @@ void repair_microseconds(std::vector<Event>& events) {
 
 Image<float> RealClip::image_at(double s) const {
   const double part = (start_s + s) / complete_s - 0.5;
-  Image<float> image(frame.width(), frame.height());
+  Image<float> image(frame.scene.width(), frame.scene.height());
   for (int y = 0; y < image.height(); ++y) {
     for (int x = 0; x < image.width(); ++x) {
-      const double value = cubic_value(frame, x - part * static_cast<double>(flow_x(x, y)),
+      const double value = cubic_value(frame.scene, x - part * static_cast<double>(flow_x(x, y)),
                                        y - part * static_cast<double>(flow_y(x, y)));
-      image(x, y) = static_cast<float>(std::clamp(value, 0.0, 1.0));
+      image(x, y) = static_cast<float>(std::clamp(value * static_cast<double>(frame.vignetting(x, y)), 0.0, 1.0));
     }
   }
   return image;
+}
+
+RealClip::Region RealClip::region_inside() const {
+  const auto sees_inside = [&](int x, int y) {
+    const auto is_inside = [&](double part) {
+      const double u = x - part * static_cast<double>(flow_x(x, y)), v = y - part * static_cast<double>(flow_y(x, y));
+      return u >= kReach && u <= frame.scene.width() - 1 - kReach && v >= kReach &&
+             v <= frame.scene.height() - 1 - kReach;
+    };
+    return is_inside(-0.5) && is_inside(0.5);
+  };
+  int left = 0, right = frame.scene.width() - 1, top = 0, bottom = frame.scene.height() - 1;
+  const auto column_sees = [&](int x) {
+    for (int y = top; y <= bottom; ++y)
+      if (!sees_inside(x, y)) return false;
+    return true;
+  };
+  const auto row_sees = [&](int y) {
+    for (int x = left; x <= right; ++x)
+      if (!sees_inside(x, y)) return false;
+    return true;
+  };
+  for (bool changed = true; changed && left <= right && top <= bottom;) {
+    changed = false;
+    if (!column_sees(left)) ++left, changed = true;
+    if (!column_sees(right)) --right, changed = true;
+    if (!row_sees(top)) ++top, changed = true;
+    if (!row_sees(bottom)) --bottom, changed = true;
+  }
+  if (left > right || top > bottom)
+    throw UserError(name + ": every pixel sees the outside of the frame; the recording moves too far");
+  return {left, top, right - left + 1, bottom - top + 1};
 }
 
 RealClip RealClip::part(double from, double to) const {
@@ -195,8 +185,7 @@ RealClip read_real_clip(const fs::path& folder) {
   }
   const std::optional<fs::path> png = only_png(folder);
   if (!png) throw UserError(folder.string() + ": contains no PNG file");
-  clip.frame = blurred(read_frame(*png, width, height), kBlur_px);
-  for (float& value : clip.frame.pixels()) value = std::clamp(value, static_cast<float>(kDarkest), 1.0F);
+  clip.frame = read_real_frame(*png, width, height);
   EventsFile file(folder / "events.txt", {SensorSize{width, height}, {}});
   std::vector<Event> events;
   while (file.read(events, std::size_t{1} << 20)) clip.events.insert(clip.events.end(), events.begin(), events.end());

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "esim/core/image.h"
+#include "esim/evaluate/realism/real_frame.h"
 #include "esim/events/event.h"
 #include "esim/stats/sensor/integer_histogram.h"
 
@@ -17,23 +18,32 @@ struct RealClip {
   std::string name;
   std::vector<Event> events;  ///< from time 0 on
   double duration_s = 0;
-  Image<float> frame;           ///< linear intensity, 1 = white, at the middle of the complete recording
+  RealFrame frame;              ///< at the middle of the complete recording
   Image<float> flow_x, flow_y;  ///< displacement of each pixel during the complete recording, px
   double start_s = 0;           ///< of this part, after the start of the complete recording
   double complete_s = 0;        ///< duration of the complete recording
 
+  /// A rectangle of pixels.
+  struct Region {
+    int x = 0, y = 0, width = 0, height = 0;
+  };
+
+  /// The pixels that see only the inside of the frame during the complete recording. Throws UserError if there are
+  /// none.
+  Region region_inside() const;
+
   /// From one fraction of the duration to another.
   RealClip part(double from, double to) const;
 
-  /// The frame displaced along the flow, at a time (from 0 to duration_s, or beyond).
+  /// What the camera saw at a time (from 0 to duration_s, or beyond): the frame's scene displaced along the flow, from
+  /// 0 to 1.
   Image<float> image_at(double s) const;
 };
 
 /// Reads `events.txt` (lines t x y p), `flow.npy` (1, 2, height, width; x, y; px, float64) and the only PNG file of a
 /// folder, of the sensor's size or with the frame below another one in its left column, as in the excerpts of the Event
-/// Camera Dataset at https://github.com/tub-rip/event_based_image_rec_inverse_problem. The frame is blurred by a
-/// Gaussian of 0.4 px, for its noise, and is at least 2/255. Times that are whole us but for errors of
-/// a few ns become whole us. Throws UserError.
+/// Camera Dataset at https://github.com/tub-rip/event_based_image_rec_inverse_problem. Times that are whole us but for
+/// errors of a few ns become whole us. Throws UserError.
 RealClip read_real_clip(const std::filesystem::path& folder);
 
 /// Events of real pixels in constant light, for 10 s, as counts of intervals by rate: the files noise_pos_*lux.npy and

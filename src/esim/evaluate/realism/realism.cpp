@@ -46,20 +46,23 @@ class Scratch {
   fs::path path_;
 };
 
-/// Calls see(image, t) for the frames of a clip, from before its start to its end.
+/// A whole second, so that the frames of a chip do not depend on the duration of the history.
+double start_of_clip(const RealismOptions& options) { return std::ceil(options.history_s); }
+
+/// Calls see(image, t) for the frames of a clip, from its history to its end.
 template <typename See>
 void for_each_frame(const RealClip& clip, const RealismOptions& options, const See& see) {
-  const auto frames =
-      static_cast<std::int64_t>(std::ceil((clip.duration_s + options.before_s) / options.frame_step_s)) + 1;
-  for (std::int64_t k = 0; k < frames; ++k) {
-    const double s = static_cast<double>(k) * options.frame_step_s;
-    see(clip.image_at(s - options.before_s), to_ns(s));
-  }
+  const auto steps_in = [](double s, double step_s) { return static_cast<std::int64_t>(std::ceil(s / step_s)); };
+  const auto see_at = [&](double s) { see(clip.image_at(s), to_ns(start_of_clip(options) + s)); };
+  const double before_s = static_cast<double>(steps_in(options.before_s, options.frame_step_s)) * options.frame_step_s;
+  for (std::int64_t k = steps_in(options.history_s - before_s, options.history_step_s); k > 0; --k)
+    see_at(-before_s - static_cast<double>(k) * options.history_step_s);
+  for (double s = -before_s; s < clip.duration_s + options.frame_step_s; s += options.frame_step_s) see_at(s);
 }
 
 std::vector<Event> simulate(const SensorModel& model, const RealClip& clip, const RealismOptions& options) {
   const Workers workers(options.threads);
-  EventCamera camera(model.options, clip.frame.width(), clip.frame.height(), options.seed);
+  EventCamera camera(model.options, clip.frame.scene.width(), clip.frame.scene.height(), options.seed);
   std::vector<Event> events;
   for_each_frame(clip, options,
                  [&](const Image<float>& image, TimeNs t) { camera.process(image, t, events, workers); });
@@ -99,21 +102,29 @@ std::vector<Event> run_command(const SensorModel& model, const RealClip& clip, c
     throw UserError(fmt::format("the command of {} failed with status {}: {}", model.name,
                                 WIFEXITED(status) ? WEXITSTATUS(status) : status, command));
   }
-  EventsFile file(output, {SensorSize{clip.frame.width(), clip.frame.height()}, {}});
+  EventsFile file(output, {SensorSize{clip.frame.scene.width(), clip.frame.scene.height()}, {}});
   std::vector<Event> all, events;
   while (file.read(events, std::size_t{1} << 20)) all.insert(all.end(), events.begin(), events.end());
   return all;
 }
 
+/// Of the pixels whose simulation sees only what the frame shows, during the clip.
 SensorStatistics statistics_of(EventSpan events, const RealClip& clip) {
-  SensorStatisticsCounter counter(SensorSize{clip.frame.width(), clip.frame.height()});
-  counter.add(events);
+  const auto [left, top, width, height] = clip.region_inside();
+  std::vector<Event> compared;
+  for (const Event& event : events) {
+    const int x = event.x - left, y = event.y - top;
+    if (x >= 0 && x < width && y >= 0 && y < height)
+      compared.push_back({event.t, static_cast<std::uint16_t>(x), static_cast<std::uint16_t>(y), event.polarity});
+  }
+  SensorStatisticsCounter counter(SensorSize{width, height});
+  counter.add(compared);
   return std::move(counter).finish();
 }
 
 /// The events of the clip's own time, from 0 on.
-std::vector<Event> within_clip(const std::vector<Event>& events, const RealClip& clip, double before_s) {
-  const TimeNs start = to_ns(before_s), end = start + to_ns(clip.duration_s);
+std::vector<Event> within_clip(const std::vector<Event>& events, const RealClip& clip, const RealismOptions& options) {
+  const TimeNs start = to_ns(start_of_clip(options)), end = start + to_ns(clip.duration_s);
   std::vector<Event> kept;
   for (const Event& event : events) {
     if (event.t >= start && event.t <= end) kept.push_back({event.t - start, event.x, event.y, event.polarity});
@@ -216,7 +227,7 @@ SimulationFit fit_to_clip(const SensorModel& model, const RealClip& clip, const 
                           const std::function<bool(const std::string&)>& goes_on) {
   const auto simulated = [&](const EventCameraOptions& sensor) {
     if (!goes_on(model.name + ": fit to " + clip.name)) throw Interrupted();
-    return statistics_of(within_clip(simulate({model.name, sensor, {}}, clip, options), clip, options.before_s), clip);
+    return statistics_of(within_clip(simulate({model.name, sensor, {}}, clip, options), clip, options), clip);
   };
   return fit_by_simulation(model.options, statistics_of(clip.events, clip), simulated);
 }
@@ -265,9 +276,9 @@ RealismEvaluation evaluate_realism(const fs::path& folder, const std::vector<Sen
                                 : run_command(model, clip, scratch->path() / "frames",
                                               scratch->path() / fmt::format("events{}.txt", evaluation.clips.size()));
       const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-      evaluation.clips.push_back(
-          {clip.name, model.name,
-           compare_sensors(truth, statistics_of(within_clip(events, clip, options.before_s), clip)), seconds});
+      evaluation.clips.push_back({clip.name, model.name,
+                                  compare_sensors(truth, statistics_of(within_clip(events, clip, options), clip)),
+                                  seconds});
     }
   }
   for (const RealNoise& noise : real.noise) {

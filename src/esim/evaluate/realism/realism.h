@@ -31,7 +31,9 @@ struct RealismOptions {
   std::uint64_t seed = 1;
   int threads = 1;
   double frame_step_s = 2.5e-4;  ///< of the frames that move
-  double before_s = 0.03;        ///< motion before the clip, which does not count
+  /// Motion before the clip, which does not count: areas whose contrast is below the thresholds have then had their
+  /// events. Its frames are history_step_s apart, until before_s before the clip.
+  double history_s = 2, history_step_s = 8e-3, before_s = 0.03;
   /// If set, each event camera is also fitted to this part, by simulation, and compared. Of that clip, only the rest is
   /// then compared.
   std::optional<ClipPart> fit_to{};

@@ -18,27 +18,28 @@ TimeNs next_multiple(TimeNs t, TimeNs period) {
 
 }  // namespace
 
-CircuitReadout::CircuitReadout(const ReadoutOptions& options, int width, int height)
+CircuitReadout::CircuitReadout(const ReadoutOptions& options, int width, int height, std::uint64_t seed,
+                               std::uint16_t stream)
     : options_(options),
+      random_(seed, Purpose::circuit_readout, stream),
       width_(width),
       scan_(to_ns(options.scan_period_us * 1e-6)),
       time_stamp_(std::max<TimeNs>(1, to_ns(options.time_stamp_us * 1e-6))),
-      usual_delay_(to_ns(1e-6 * (1 + options.scan_period_us * (options.scan_hold ? 2 : 1) + options.row_rest_us +
-                                 options.row_scan_us * height))),
+      usual_delay_(to_ns(1e-6 * (1 + options.scan_period_us * (options.scan_hold ? 2 : 1) + 8 * options.row_wait_us))),
       row_time_(1e3 * options.row_time_us),
       event_time_(options.rate_mev_per_s > 0 ? 1e3 / options.rate_mev_per_s : 0.0),
-      pass_(1e3 * options.row_scan_us),
-      rest_(1e3 * options.row_rest_us),
       first_(static_cast<std::size_t>(height), kNone),
-      last_read_(static_cast<std::size_t>(height), std::numeric_limits<double>::lowest()) {}
+      readings_(static_cast<std::size_t>(height)),
+      waiting_on_(static_cast<std::size_t>(width)),
+      due_(static_cast<std::size_t>(height)) {}
 
-double CircuitReadout::visit(std::uint32_t row, double t) const {
-  const auto rows = static_cast<std::uint32_t>(first_.size());
-  t = std::max(t, last_read_[row] + rest_);
-  const double first = free_at_ + pass_ * static_cast<double>((row + rows - position_) % rows);
-  if (first >= t) return first;
-  const double round = pass_ * static_cast<double>(rows);
-  return round > 0 ? first + round * std::ceil((t - first) / round) : t;
+/// A gamma distribution of shape 4, ns.
+double CircuitReadout::wait_of(std::uint32_t row) {
+  if (options_.row_wait_us <= 0) return 0;
+  double product = 1;
+  for (const std::uint32_t word : random_.bits(row, readings_[row]++)) product *= (word + 0.5) * 0x1p-32;
+  const double mean = 1e3 * options_.row_wait_us * (1 + static_cast<double>(rows_.size()) / kRows);
+  return -0.25 * mean * std::log(product);
 }
 
 /// The time of the first scan that reports the request.
@@ -52,12 +53,24 @@ void CircuitReadout::take(const Event& request) {
   if (epoch_ == kNoTime) epoch_ = request.t;
   std::uint32_t& first = first_[request.y];
   if (first == kNone) {
+    due_[request.y] = static_cast<double>(request.t - epoch_) + wait_of(request.y);
     rows_.push_back(request.y);
-    visits_.push_back(visit(request.y, static_cast<double>(request.t - epoch_)));
   }
   in_rows_.push_back({request, first});
   first = static_cast<std::uint32_t>(in_rows_.size() - 1);
   ++waiting_;
+  if (request.polarity > 0) ++waiting_on_[request.x];
+}
+
+/// Of rows_: the one that is read next. Rows that are due while the arbiter is busy keep the order of their requests.
+std::size_t CircuitReadout::next_row() const {
+  const auto time_of = [this](std::uint32_t row) { return std::max(due_[row], free_at_); };
+  return static_cast<std::size_t>(std::ranges::min_element(rows_, {}, time_of) - rows_.begin());
+}
+
+TimeNs CircuitReadout::next_service() const {
+  if (rows_.empty()) return kNoTime;
+  return epoch_ + static_cast<TimeNs>(std::ceil(std::max(due_[rows_[next_row()]], free_at_)));
 }
 
 /// Stamps a request, and lets its pixel continue.
@@ -81,27 +94,43 @@ void CircuitReadout::stamp(CircuitArray& pixels, const Event& request, TimeNs t)
   }
 }
 
-/// Reads out the row that is visited first.
+/// Reads out the next row.
 void CircuitReadout::serve(CircuitArray& pixels) {
-  const auto next = static_cast<std::size_t>(std::ranges::min_element(visits_) - visits_.begin());
+  const std::size_t next = next_row();
   const std::uint32_t row = rows_[next];
-  const double now = visits_[next];
+  rows_.erase(rows_.begin() + static_cast<std::ptrdiff_t>(next));
+  const double now = std::max(due_[row], free_at_);
   const TimeNs t = epoch_ + static_cast<TimeNs>(std::ceil(now));
   const std::size_t begin = read_.size();
   double count = 0;
   for (std::uint32_t at = std::exchange(first_[row], kNone); at != kNone; at = in_rows_[at].next) {
-    stamp(pixels, in_rows_[at].request, t);
+    const Event& request = in_rows_[at].request;
+    if (request.polarity > 0) --waiting_on_[request.x];
+    stamp(pixels, request, t);
     ++count;
   }
   std::sort(read_.begin() + static_cast<std::ptrdiff_t>(begin), read_.end());
+  if (options_.column_coupling > 0) {
+    for (std::size_t i = begin; i < read_.size(); ++i) call_rows(read_[i].x, now);
+  }
   waiting_ -= static_cast<std::size_t>(count);
   if (waiting_ == 0) in_rows_.clear();
-  last_read_[row] = now;
-  position_ = (row + 1) % static_cast<std::uint32_t>(first_.size());
-  free_at_ = now + std::max(1.0, pass_ + row_time_ + event_time_ * count);
-  rows_.erase(rows_.begin() + static_cast<std::ptrdiff_t>(next));
-  visits_.resize(rows_.size());
-  for (std::size_t i = 0; i < rows_.size(); ++i) visits_[i] = visit(rows_[i], now);
+  free_at_ = now + std::max(1.0, row_time_ + event_time_ * count);
+}
+
+/// Lets a column call the rows of its waiting ON events.
+void CircuitReadout::call_rows(std::uint16_t column, double now) {
+  if (waiting_on_[column] == 0) return;
+  for (const std::uint32_t row : rows_) {
+    if (due_[row] <= now + kCall) continue;
+    for (std::uint32_t at = first_[row]; at != kNone; at = in_rows_[at].next) {
+      const Event& request = in_rows_[at].request;
+      if (request.x != column || request.polarity <= 0) continue;
+      const double chance = (random_.bits(row, readings_[row]++)[0] + 0.5) * 0x1p-32;
+      if (chance < options_.column_coupling) due_[row] = now + kCall;
+      break;
+    }
+  }
 }
 
 void CircuitReadout::advance(CircuitArray& pixels, EventQueue& found, TimeNs watermark, PendingLabels* labels) {
@@ -112,7 +141,7 @@ void CircuitReadout::advance(CircuitArray& pixels, EventQueue& found, TimeNs wat
     const bool has_found = next < known.size();
     const bool from_found = has_found && (requests_.empty() || known[next] < requests_.front());
     const TimeNs t = from_found ? known[next].t : requests_.empty() ? kNoTime : requests_.front().t;
-    const TimeNs service = rows_.empty() ? kNoTime : epoch_ + static_cast<TimeNs>(std::ceil(std::ranges::min(visits_)));
+    const TimeNs service = next_service();
     if (std::min(t, service) > watermark || std::min(t, service) == kNoTime) break;
     if (service < t) {
       serve(pixels);

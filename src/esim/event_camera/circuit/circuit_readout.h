@@ -4,6 +4,7 @@
 #include <utility>
 #include <vector>
 
+#include "esim/core/random.h"
 #include "esim/event_camera/circuit/circuit_array.h"
 #include "esim/event_camera/labels/pending_labels.h"
 #include "esim/event_camera/segment_history.h"
@@ -15,16 +16,17 @@ namespace esim::inline event_camera {
 /// The readout of pixels by their circuit. A pixel that fires raises a request and waits, held in reset, until it has
 /// been read; then its refractory period begins. Either of two kinds:
 ///
-/// Rows (arbitrated, as in a DAVIS): the arbiter visits the rows in turn, and passes a row without requests in
-/// row_scan. In a row with requests, it stamps all waiting events with the time of its visit, and is busy for row_time
-/// and the time of these events. It leaves out rows that it has read less than row_rest before. The busier it is, the
-/// longer a round takes, and the more events share a stamp.
+/// Rows (arbitrated, as in a DAVIS): a row is read when a random time has passed since its first request, and the rows
+/// before it have been read. The time is row_wait on average if no other row waits, and twice as long if kRows do. All
+/// waiting events of the row get this time. The arbiter is then busy for row_time and the time of these events. A
+/// column of which an event is read calls, with the probability column_coupling, each row with a waiting ON event in
+/// it: that row is read after kCall.
 ///
 /// Scans (as in a DVXplorer): column x is read at (k + x / width) scan_period, for all integers k. With scan_hold, all
 /// columns report the pixels that had fired when the scan began.
 class CircuitReadout {
  public:
-  CircuitReadout(const ReadoutOptions& options, int width, int height);
+  CircuitReadout(const ReadoutOptions& options, int width, int height, std::uint64_t seed, std::uint16_t stream);
 
   /// The recent segments: add segments before the pixels are advanced through them.
   SegmentHistory history;
@@ -47,12 +49,12 @@ class CircuitReadout {
   static void transfer(Archive& archive, Self& self) {
     archive.list(self.requests_);
     archive.fixed(self.first_);
-    archive.fixed(self.last_read_);
+    archive.fixed(self.readings_);
+    archive.fixed(self.waiting_on_);
     archive.list(self.in_rows_);
     archive.list(self.rows_);
-    archive.list(self.visits_);
+    archive.fixed(self.due_);
     archive.value(self.epoch_);
-    archive.value(self.position_);
     archive.list(self.read_);
     archive.value(self.free_at_);
     archive.value(self.waiting_);
@@ -69,28 +71,35 @@ class CircuitReadout {
     std::uint32_t next;
   };
 
+  static constexpr double kRows = ReadoutOptions::kRowsOfDoubleWait;
+  /// From the reading of an event until a row is read that its column has called, ns.
+  static constexpr double kCall = 600;
+
   void take(const Event& request);
+  std::size_t next_row() const;
+  TimeNs next_service() const;
   void serve(CircuitArray& pixels);
+  void call_rows(std::uint16_t column, double now);
   void stamp(CircuitArray& pixels, const Event& request, TimeNs t);
   TimeNs scan_time(const Event& request) const;
-  /// The time of the arbiter's first visit of a row at `t` or later, if it finds no requests before.
-  double visit(std::uint32_t row, double t) const;
+  double wait_of(std::uint32_t row);
 
   ReadoutOptions options_;
+  AddressedRandom random_;
   int width_;
   TimeNs scan_, time_stamp_;
-  TimeNs usual_delay_;                          // of an idle readout, at most
-  double row_time_, event_time_, pass_, rest_;  // ns
+  TimeNs usual_delay_;            // of an idle readout, nearly always
+  double row_time_, event_time_;  // ns
 
-  std::vector<Event> requests_;       // not yet taken: a heap with the earliest on top
-  std::vector<std::uint32_t> first_;  // of each row in in_rows_, or kNone
-  std::vector<double> last_read_;     // of each row, ns after the epoch
-  std::vector<InRow> in_rows_;        // waiting requests, in lists
-  std::vector<std::uint32_t> rows_;   // with waiting requests
-  std::vector<double> visits_;        // of rows_: when they are read, ns after the epoch
-  TimeNs epoch_ = kNoTime;            // time of the first request
-  double free_at_ = 0;                // when the arbiter arrives at row position_, ns after the epoch
-  std::uint32_t position_ = 0;
+  std::vector<Event> requests_;            // not yet taken: a heap with the earliest on top
+  std::vector<std::uint32_t> first_;       // of each row in in_rows_, or kNone
+  std::vector<std::uint32_t> readings_;    // of each row: the number of random numbers it has used
+  std::vector<std::uint32_t> waiting_on_;  // waiting ON events of each column
+  std::vector<InRow> in_rows_;             // waiting requests, in lists
+  std::vector<std::uint32_t> rows_;        // with waiting requests, in the order of their first ones
+  std::vector<double> due_;                // of each row: when it can be read, ns after the epoch
+  TimeNs epoch_ = kNoTime;                 // time of the first request
+  double free_at_ = 0;                     // ns after the epoch
   std::size_t waiting_ = 0;
   std::vector<Event> read_;  // in order; the first released_ have been released
   std::size_t released_ = 0;

@@ -25,30 +25,24 @@ class ReadoutSearch {
   std::vector<Estimate> take_estimates() { return std::move(estimates_); }
 
  private:
-  /// The times of an arbiter that visits the rows in turn, us.
-  struct Rows {
-    double round = 0;  ///< row_scan of all rows
-    double time = 0, rest = 0;
-  };
-  /// What is tried for one of them, and the sums of deviations that were found.
+  /// An option of the readout, what is tried for it, and the sums of deviations that were found.
   struct Axis {
-    double Rows::*time;
+    double ReadoutOptions::*option;
     std::vector<double> values;
     std::vector<std::pair<double, double>> tried{};  // value, sum
   };
 
   double sum_of_deviations(const EventCameraOptions& sensor) const;
-  double sum_of_deviations(EventCameraOptions sensor, const Rows& rows) const;
-  void put(EventCameraOptions& sensor, const Rows& rows) const;
+  double sum_of_deviations(EventCameraOptions sensor, const ReadoutOptions& readout) const;
   void search_rows(const EventCameraOptions& sensor);
   void try_values(const EventCameraOptions& sensor, Axis& axis, const std::vector<double>& values);
-  void report(const char* name, Axis axis, double scale);
-  void unknown(const char* name, std::string why);
+  void report(const char* name, const char* unit, Axis axis);
+  void unknown(const char* name, const char* unit, std::string why);
 
   const SensorStatistics& real_;
   SimulatedStatistics simulate_;
-  Rows rows_;        // the best ones
-  double best_ = 0;  // their sum of deviations
+  ReadoutOptions rows_;  // the best one
+  double best_ = 0;      // its sum of deviations
   std::vector<Estimate> estimates_;
 };
 

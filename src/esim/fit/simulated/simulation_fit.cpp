@@ -52,7 +52,7 @@ class Fitter {
                                           real_.on, real_.events - real_.on, kFewest);
       for (const char* name :
            {"contrast_threshold_on", "contrast_threshold_off", "refractory_period_us", "leak_rate_hz",
-            "readout.time_stamp_us", "readout.row_scan_us", "readout.row_time_us", "readout.row_rest_us"})
+            "readout.time_stamp_us", "readout.row_wait_us", "readout.row_time_us", "readout.column_coupling"})
         unknown(name, "", why);
       return std::move(fit_);
     }

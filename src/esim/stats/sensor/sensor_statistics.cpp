@@ -50,6 +50,7 @@ void SensorStatisticsCounter::add(EventSpan events) {
     if (event.t != last_) unit_ = std::gcd(unit_, event.t - last_);
     last_ = event.t;
     coincidences_.add(us, event.x, event.y, sums.same_us, sums.after);
+    row_pairs_.add(us, event.y);
     for (std::size_t i = 0; i < fano_.size(); ++i) fano_[i].add(us, sums.fano[i]);
     stamps_.add({event.t, event.x});
     if (pixel.polarity != 0) {
@@ -98,6 +99,7 @@ SensorStatistics SensorStatisticsCounter::finish() && {
   for (const StreamSums& block : s.blocks) s.StreamSums::add(block);
   count_pixels(s);
   s.scan = find_scan(stamps_.items(), s.sensor.width);
+  s.row_wait = row_pairs_.wait();
   return s;
 }
 
@@ -111,7 +113,7 @@ std::vector<NamedValue> values_of(const SensorStatistics& s) {
       {kRowSameUs, "", difference, s.same_us.row_over_chance(s.sensor.height)},
       {kRowLater, "", difference, s.after.row_over_chance(s.sensor.height)},
       {kColumnSameUs, "", difference, s.same_us.column_over_chance(s.sensor.width)},
-      {"same column, 1 to 5 us later, over chance", "", difference, s.after.column_over_chance(s.sensor.width)},
+      {kColumnLater, "", difference, s.after.column_over_chance(s.sensor.width)},
       {kShortIntervals, "s", ratio, interval_s(0.01)},
       {"10 % of the intervals", "s", ratio, interval_s(0.1)},
       {"50 % of the intervals", "s", ratio, interval_s(0.5)},

@@ -9,6 +9,7 @@
 #include "esim/recording/format.h"
 #include "esim/stats/pixel_map.h"
 #include "esim/stats/sensor/quiet_areas.h"
+#include "esim/stats/sensor/row_pairs.h"
 #include "esim/stats/sensor/scan.h"
 #include "esim/stats/sensor/sums.h"
 #include "esim/stats/stream_sample.h"
@@ -25,6 +26,7 @@ struct SensorStatistics : StreamSums, PixelSums {
   TimeNs stamp_unit = 0;  ///< largest common divisor of the differences of time stamps; 0 if they are equal
   QuietAreas quiet;
   std::optional<Scan> scan;
+  RowPairs::Wait row_wait;
 
   /// The same sums in parts of the stream and of the sensor, for resampling: blocks of equal duration, and kTiles x
   /// kTiles areas.
@@ -39,6 +41,7 @@ inline constexpr std::string_view kOnFraction = "ON fraction";
 inline constexpr std::string_view kRowSameUs = "same row, same us, over chance";
 inline constexpr std::string_view kRowLater = "same row, 1 to 5 us later, over chance";
 inline constexpr std::string_view kColumnSameUs = "same column, same us, over chance";
+inline constexpr std::string_view kColumnLater = "same column, 1 to 5 us later, over chance";
 inline constexpr std::string_view kShortIntervals = "1 % of the intervals";
 inline constexpr std::string_view kEventsPerStamp = "events per time stamp";
 inline constexpr std::string_view kScanPeriod = "period of the scan";
@@ -84,6 +87,7 @@ class SensorStatisticsCounter {
   PixelMap<Pixel> pixels_;
   TimeBlocks blocks_;
   Coincidences coincidences_;
+  RowPairs row_pairs_;
   std::vector<Fano> fano_;
   StreamSample<ColumnStamp> stamps_;
   bool any_ = false;

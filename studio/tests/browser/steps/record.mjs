@@ -102,7 +102,7 @@ test("the sensor of a recording with samples is changed, and its new events appe
   await visit(page, server, "#/look?recording=project/kept");
   const caption = page.locator(".look figcaption").first();
   const shownEvents = async () => Number((await caption.textContent()).replace(/ events.*/, "").replace(/\D/g, ""));
-  const recorded = await until(shownEvents, "the recorded events"); // before the recording is read there are none
+  const recorded = await until(shownEvents, "the recorded events"); // 0 until the recording is read
   await page.getByText("Change the sensor").click();
   const form = page.locator(".sensor-form");
   const threshold = form.getByLabel("event_camera.contrast_threshold", { exact: true });

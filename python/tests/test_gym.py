@@ -7,6 +7,7 @@ gymnasium = pytest.importorskip("gymnasium")
 from gymnasium.utils.env_checker import check_env  # noqa: E402
 
 import esim.gym  # noqa: E402
+from esim.gym._motion import rotation_vector  # noqa: E402
 
 START = np.eye(4)
 START[:3, :3] = [[0, 0, 1], [-1, 0, 0], [0, -1, 0]]  # looks along x, at the plane of `poster`
@@ -93,6 +94,12 @@ def test_bad_arguments(poster):
         make(poster, step_s=0.012)
     with pytest.raises(esim.Error, match="observation"):
         make(poster, observation="frames")
+    with pytest.raises(esim.Error, match="action"):
+        make(poster, action="force")
+    with pytest.raises(esim.Error, match="max_events"):
+        make(poster, max_events=0)
+    with pytest.raises(esim.Error, match="autoreset"):
+        make_vector(poster, 2, autoreset="disabled")
     with pytest.raises(esim.Error, match="several event sensors"):
         make(poster, overrides={"duration_s": 0.1, "event_camera.contrast_threshold": {"values": [0.2, 0.4]}})
 
@@ -133,6 +140,92 @@ def test_episodes_end_and_begin_by_themselves(poster):
     assert [row[1] for row in rows] == [[False, k in (3, 8)] for k in range(12)]  # after four steps, and one that begins
     assert rows[4][0] == 0 and rows[4][3][1] == 0 and rows[5][0] == pytest.approx(0.01)
     assert [row[2][0] for row in rows] == [k == 9 for k in range(12)] and rows[10][3][0] == 0
+
+
+def test_episodes_end_and_begin_in_the_same_step(poster):
+    options = {"terminated": lambda env, infos: infos["pose"][:, 2, 3] > 0.0349, "observation": ["counts", "pose"]}
+    usual, at_once = make_vector(poster, 2, **options), make_vector(poster, 2, autoreset="same_step", **options)
+    assert at_once.metadata["autoreset_mode"] == gymnasium.vector.AutoresetMode.SAME_STEP
+    usual.reset(seed=1), at_once.reset(seed=1)
+    actions = np.array([[0, 0, 0, 0, 0, 0], [0, -1, 0, 0, 0, 0]])
+    for k in range(4):
+        seen, _, ended, _, infos = usual.step(actions)
+        seen_at_once, _, ended_at_once, _, infos_at_once = at_once.step(actions)
+        assert ended.tolist() == ended_at_once.tolist() == [False, k == 3]
+    assert infos_at_once["_final_obs"].tolist() == [False, True] and infos_at_once["final_obs"][0] is None
+    for name in ("counts", "pose"):
+        np.testing.assert_array_equal(infos_at_once["final_obs"][1][name], seen[name][1])
+        np.testing.assert_array_equal(seen_at_once[name][0], seen[name][0])
+    np.testing.assert_array_equal(infos_at_once["final_info"]["t"], infos["t"])
+    assert not seen_at_once["counts"][1].any() and infos_at_once["t"].tolist() == [infos["t"][0], 0]
+    np.testing.assert_allclose(seen_at_once["pose"][1], START)
+    following, *_ = usual.step(actions)  # agent 1 begins again
+    following, *_ = usual.step(actions)
+    at_once.step(actions)
+    np.testing.assert_array_equal(at_once.pose[1], usual.pose[1])
+
+
+def random_rotations(count, seed):
+    vectors = np.random.default_rng(seed).normal(size=(count, 3))
+    return vectors * np.minimum(1, 3.1 / np.linalg.norm(vectors, axis=1))[:, None]
+
+
+def test_rotation_vectors_are_found_again():
+    vectors = np.concatenate([random_rotations(200, 1), np.pi * np.eye(3), -3.14 * np.eye(3), [[0, 0, 0], [1e-9, 0, 0]]])
+    found = rotation_vector(esim.gym.rotation(vectors))
+    np.testing.assert_allclose(esim.gym.rotation(found), esim.gym.rotation(vectors), atol=1e-7)
+    assert (np.linalg.norm(found, axis=1) <= np.pi + 1e-9).all()
+
+
+def test_poses_are_reached(poster):
+    env = make(poster, action="pose")
+    check_env(make(poster, action="pose"), skip_render_check=True)
+    env.reset(seed=1)
+    target = np.array([0.01, -0.02, 0.005, 1.2, -1.21, 1.22])
+    *_, info = env.step(target)
+    np.testing.assert_allclose(info["pose"][:3, 3], target[:3], atol=1e-9)
+    np.testing.assert_allclose(info["pose"][:3, :3], esim.gym.rotation(target[3:]), atol=1e-9)
+    np.testing.assert_allclose(info["velocity"], target[:3] / 0.01, atol=1e-9)
+
+
+def test_thrust_accelerates_against_gravity(poster):
+    upright = np.eye(4)
+    env = esim.gym.EventEnv(poster, upright, action="thrust", max_acceleration=19.62, overrides={"duration_s": 0.5})
+    check_env(env, skip_render_check=True)
+    env.reset(seed=1)
+    for _ in range(10):
+        *_, info = env.step([0.5, 0, 0, 0])  # hovers
+    np.testing.assert_allclose(info["pose"], upright, atol=1e-6)
+    for _ in range(10):
+        *_, info = env.step([0, 0, 0, 0])
+    np.testing.assert_allclose(info["velocity"], [0, 0, -0.981], atol=1e-6)
+    np.testing.assert_allclose(info["pose"][:3, 3], [0, 0, -0.5 * 9.81 * 0.01], atol=1e-6)
+    env.reset(seed=1)
+    *_, info = env.step([1, 0, 0, 0])
+    assert info["velocity"][2] == pytest.approx(0.0981)
+    many = make_vector(poster, 2, action="thrust", max_acceleration=19.62)
+    many.reset(seed=1)
+    *_, infos = many.step([[1, 0, 0, 0], [0, 0, 0, 1]])
+    # START looks along x: the body's z axis is x.
+    np.testing.assert_allclose(infos["velocity"], [[0.1962, 0, -0.0981], [0, 0, -0.0981]], atol=1e-6)
+
+
+def test_raw_events_are_padded(poster):
+    env = make_vector(poster, 2, observation="events", max_events=50)
+    env.reset(seed=1)
+    left_out = 0
+    for _ in range(5):
+        seen, *_, infos = env.step([[1, 0, 0, 0, 0, 0], [0, 0, 0, 0, 0, 0]])
+        events, rows = env.events[0], seen[0]
+        assert infos["events_left_out"].tolist() == [max(0, len(events) - 50), 0] and not seen[1].any()
+        left_out += infos["events_left_out"][0]
+        last = events[-50:]
+        np.testing.assert_array_equal(rows[: len(last), 1:3], np.column_stack([last["x"], last["y"]]))
+        np.testing.assert_array_equal(rows[: len(last), 3], np.where(last["p"] > 0, 1, -1))
+        np.testing.assert_allclose(rows[: len(last), 0], 1e-9 * (last["t"] - env.packets[0][0].t0), atol=1e-8)
+        assert not rows[len(last) :].any()
+    assert left_out > 0
+    check_env(make(poster, observation="events"), skip_render_check=True)
 
 
 def test_gymnasium_makes_it(poster):

@@ -9,7 +9,7 @@ import gymnasium
 
 from ._event_env import EventEnv
 from ._event_vector_env import EventVectorEnv
-from ._view import rotation
+from ._motion import rotation
 
 __all__ = ["EventEnv", "EventVectorEnv", "rotation"]
 

@@ -10,19 +10,11 @@ from .._represent import event_count, time_surface, voxel_grid
 from .._scenario import to_overrides, to_scenario
 from .._simulation import begin_live
 from .._types import EVENT_DTYPE
+from ._motion import Pose, Thrust, Twist
 
 
-def rotation(vectors):
-    """The rotation matrices (..., 3, 3) of rotation vectors (..., 3), rad."""
-    vectors = np.asarray(vectors, np.float64)
-    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
-    x, y, z = np.moveaxis(vectors, -1, 0)
-    zero = np.zeros_like(x)
-    K = np.stack([zero, -z, y, z, zero, -x, -y, x, zero], axis=-1).reshape(*vectors.shape, 3)
-    return np.eye(3) + np.sinc(angle / np.pi) * K + 0.5 * np.sinc(angle / (2 * np.pi)) ** 2 * (K @ K)
-
-
-OBSERVATIONS = ("voxels", "counts", "time_surface", "depth", "motion_field", "imu", "pose")
+OBSERVATIONS = ("voxels", "counts", "time_surface", "events", "depth", "motion_field", "imu", "pose")
+ACTIONS = ("twist", "pose", "thrust")
 
 
 class View:
@@ -38,24 +30,31 @@ class View:
         interval_s=0.005,
         max_velocity=1.0,
         max_angular_velocity=1.0,
+        max_acceleration=20.0,
+        action="twist",
         observation="voxels",
         bins=5,
         tau_s=0.03,
+        max_events=10_000,
         overrides=None,
     ):
         self.scenario, self.overrides, self.start = to_scenario(scenario), overrides, start
         self.step_s = _checks.number(step_s, "step_s", above=0)
         self.interval_s = _checks.number(interval_s, "interval_s", low=1e-6, high=10)
-        self.poses = round(self.step_s / self.interval_s)  # of a step
-        if self.poses < 1 or abs(self.poses * self.interval_s - self.step_s) > 1e-9:
+        poses = round(self.step_s / self.interval_s)  # of a step
+        if poses < 1 or abs(poses * self.interval_s - self.step_s) > 1e-9:
             raise Error(f"step_s must be a multiple of interval_s = {interval_s:g} s, not {step_s:g} s")
         velocity = _checks.number(max_velocity, "max_velocity", low=0)
         angular = _checks.number(max_angular_velocity, "max_angular_velocity", low=0)
-        self.limits = np.array([velocity] * 3 + [angular] * 3)
+        acceleration = _checks.number(max_acceleration, "max_acceleration", low=0)
+        motion = {"twist": Twist, "pose": Pose, "thrust": Thrust}[_checks.one_of(action, "action", ACTIONS)]
+        linear = [acceleration] if motion is Thrust else [velocity] * 3
+        self.motion = motion(self.interval_s, poses, np.array([*linear, *[angular] * 3]))
         self.alone = isinstance(observation, str)
         self.names = [_checks.one_of(name, "observation", OBSERVATIONS) for name in ([observation] if self.alone else observation)]
         self.bins = _checks.whole(bins, "bins", 1, 1000)
         self.tau_s = _checks.seconds(tau_s, "tau_s", above=0)
+        self.max_events = _checks.whole(max_events, "max_events", 1, 2**31 - 1)
         values = self.scenario._read(to_overrides(overrides), True, False)
         self.scene = _core.SharedScene(values, _checks.threads(threads))
         with self.begin(self.draw_start(np.random.default_rng(0)), 0, 1) as simulation:
@@ -68,6 +67,7 @@ class View:
             "voxels": (self.bins, *size),
             "counts": (2, *size),
             "time_surface": (2, *size),
+            "events": (self.max_events, 4),
             "depth": size,
             "motion_field": (2, *size),
             "imu": (6,),
@@ -79,7 +79,7 @@ class View:
         }
         self.observation_space = spaces[observation] if self.alone else gymnasium.spaces.Dict(spaces)
         self.blank = {name: np.zeros(space.shape, np.float32) for name, space in spaces.items()}
-        self.action_space = gymnasium.spaces.Box(-1, 1, (6,), np.float32)
+        self.action_space = self.motion.space
 
     def draw_start(self, random):
         """The pose at the start of an episode."""
@@ -98,22 +98,6 @@ class View:
             scene=self.scene,
         )
 
-    def move(self, poses, actions):
-        """The poses of a step, (N, self.poses, 4, 4), from poses (N, 4, 4) on: constant velocities in the bodies' frames."""
-        actions = np.asarray(actions, np.float64)
-        if actions.shape != (len(poses), 6) or not np.isfinite(actions).all():
-            raise Error(f"actions must be 6 finite numbers for each body, not {actions}")
-        twists = np.clip(actions, -1, 1) * self.limits
-        turns = rotation(self.interval_s * twists[:, 3:])
-        moved = np.empty((len(poses), self.poses, 4, 4))
-        for k in range(self.poses):
-            R = poses[:, :3, :3]
-            moved[:, k] = poses
-            moved[:, k, :3, 3] += self.interval_s * (R @ twists[:, :3, None])[..., 0]
-            moved[:, k, :3, :3] = R @ turns
-            poses = moved[:, k]
-        return moved
-
     def events(self, packets):
         """The events of packets."""
         if len(packets) == 1:
@@ -121,12 +105,25 @@ class View:
         none = Events(np.empty(0, EVENT_DTYPE), self.width, self.height)
         return np.concatenate([none, *(packet.events for packet in packets)])
 
+    def _padded(self, events, start):
+        """The last max_events events as rows (seconds since the start of the step, x, y, polarity), then rows of zeros."""
+        rows = np.zeros((self.max_events, 4), np.float32)
+        last = events[-self.max_events :]
+        rows[: len(last)] = np.column_stack([1e-9 * (last["t"] - start), last["x"], last["y"], np.where(last["p"] > 0, 1, -1)])
+        return rows
+
+    def left_out(self, events):
+        """Events of a step for which an observation of events has no place."""
+        return max(0, len(events) - self.max_events) if "events" in self.names else 0
+
     def observe(self, seen, events, packets, pose):
         """The observation, to be copied. `seen`: what the agent saw last, by name; is replaced by what it sees now."""
         span = {"t0": _checks.ns(packets[0].t0), "t1": _checks.ns(packets[-1].t1)} if packets else {}
         for name in self.names:
             if name == "counts":
                 seen[name] = event_count(events).astype(np.float32)
+            elif name == "events":
+                seen[name] = self._padded(events, packets[0].t0 if packets else 0)
             elif name == "voxels":
                 seen[name] = voxel_grid(events, bins=self.bins, **span) if packets else self.blank[name]
             elif name == "pose":
@@ -140,4 +137,8 @@ class View:
                 elif name == "imu" and len(packet.imu):
                     last = packet.imu[-1]
                     seen[name] = np.concatenate([last["angular_rate"], last["specific_force"]]).astype(np.float32)
+        return self.chosen(seen)
+
+    def chosen(self, seen):
+        """What the agent saw last, as its observation."""
         return seen[self.names[0]] if self.alone else {name: seen[name] for name in self.names}

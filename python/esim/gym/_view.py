@@ -12,7 +12,6 @@ from .._simulation import begin_live
 from .._types import EVENT_DTYPE
 from ._motion import Pose, Thrust, Twist
 
-
 OBSERVATIONS = ("voxels", "counts", "time_surface", "events", "depth", "motion_field", "imu", "pose")
 ACTIONS = ("twist", "pose", "thrust")
 

@@ -22,13 +22,15 @@ herr_t hold_index_until_flush(hid_t access_list) {
   return H5Pset_mdc_config(access_list, &config);
 }
 
-// Byte shuffle before the codec: the high bytes of neighbouring numbers are similar.
-herr_t add_filters(hid_t creation_list, Compression compression) {
+// A shuffle before the codec: the high bytes of neighbouring numbers are similar. Bits of integers are shuffled by Blosc,
+// which is half faster than bytes and gives smaller files; floating-point numbers are larger and slower with it.
+herr_t add_filters(hid_t creation_list, Compression compression, hid_t type) {
   switch (compression) {
     case Compression::blosc: {
-      // Blosc's own shuffle. Four values are reserved for the filter, then level, shuffle, codec (5: Zstd).
-      constexpr std::array<unsigned, 7> kOptions = {0, 0, 0, 0, 1, 1, 5};
-      return H5Pset_filter(creation_list, kBloscFilter, H5Z_FLAG_OPTIONAL, kOptions.size(), kOptions.data());
+      // Four values are reserved for the filter, then level, shuffle (1: bytes, 2: bits), codec (5: Zstd).
+      const unsigned shuffle = H5Tget_class(type) == H5T_INTEGER ? 2 : 1;
+      const std::array<unsigned, 7> options = {0, 0, 0, 0, 1, shuffle, 5};
+      return H5Pset_filter(creation_list, kBloscFilter, H5Z_FLAG_OPTIONAL, options.size(), options.data());
     }
     case Compression::gzip:
       return H5Pset_shuffle(creation_list) < 0 ? -1 : H5Pset_deflate(creation_list, 4);
@@ -196,7 +198,7 @@ Series::Series(const Output& file, const char* name, SeriesLayout layout)
   const Handle creation(H5Pcreate(H5P_DATASET_CREATE), H5Pclose);
   file.check(H5Pset_obj_track_times(creation, false));
   file.check(H5Pset_chunk(creation, rank, chunk.data()));
-  file.check(add_filters(creation, layout.compression));
+  file.check(add_filters(creation, layout.compression, layout.type));
 
   // Complete chunks bypass the chunk cache; a small cache holds the growing chunk of an uncompressed series.
   const Handle access(H5Pcreate(H5P_DATASET_ACCESS), H5Pclose);

@@ -17,8 +17,9 @@ struct RealFrame {
 ///
 /// Black lines at the border, as of undistorted frames, are replaced by what is beside them. Gradual changes of
 /// brightness over the frame are taken for vignetting: a quadratic polynomial of the logarithm, found by iteratively
-/// reweighted least squares, so that objects hardly change it. The rest is the scene, blurred by a Gaussian of 0.4 px
-/// against its noise. Scene and frame are at least 2/255. Throws UserError.
+/// reweighted least squares, so that objects hardly change it. The rest is the scene, without noise: a bilateral filter
+/// of 2.5 px averages values that differ by less than about three standard deviations of the noise. Scene and frame are
+/// at least 2/255. Throws UserError.
 RealFrame read_real_frame(const std::filesystem::path& path, int width, int height);
 
 }  // namespace esim::inline evaluate

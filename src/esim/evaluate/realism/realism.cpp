@@ -52,7 +52,9 @@ double start_of_clip(const RealismOptions& options) { return std::ceil(options.h
 /// Calls see(image, t) for the frames of a clip, from its history to its end.
 template <typename See>
 void for_each_frame(const RealClip& clip, const RealismOptions& options, const See& see) {
-  const auto steps_in = [](double s, double step_s) { return static_cast<std::int64_t>(std::floor(s / step_s + 1e-9)); };
+  const auto steps_in = [](double s, double step_s) {
+    return static_cast<std::int64_t>(std::floor(s / step_s + 1e-9));
+  };
   const auto see_at = [&](double s) { see(clip.image_at(s), to_ns(start_of_clip(options) + s)); };
   const double before_s = static_cast<double>(steps_in(options.before_s, options.frame_step_s)) * options.frame_step_s;
   for (std::int64_t k = steps_in(options.history_s - before_s, options.history_step_s); k > 0; --k)
@@ -222,8 +224,8 @@ RealClip part_to_fit(const RealRecordings& real, const ClipPart& part) {
   return clip->part(part.from, part.to);
 }
 
-/// Fits an event camera to a part of a clip, by simulation of this part, with a shorter history: it is simulated tens of
-/// times.
+/// Fits an event camera to a part of a clip, by simulation of this part, with a shorter history: it is simulated tens
+/// of times.
 SimulationFit fit_to_clip(const SensorModel& model, const RealClip& clip, RealismOptions options,
                           const std::function<bool(const std::string&)>& goes_on) {
   constexpr double kHistory_s = 0.25;

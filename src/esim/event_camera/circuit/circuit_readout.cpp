@@ -8,8 +8,6 @@
 namespace esim::inline event_camera {
 namespace {
 
-constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
-
 /// The first multiple of `period` at `t` or later.
 TimeNs next_multiple(TimeNs t, TimeNs period) {
   const TimeNs multiple = t / period * period;
@@ -56,8 +54,12 @@ void CircuitReadout::take(const Event& request) {
     due_[request.y] = static_cast<double>(request.t - epoch_) + wait_of(request.y);
     rows_.push_back(request.y);
   }
-  in_rows_.push_back({request, first});
-  first = static_cast<std::uint32_t>(in_rows_.size() - 1);
+  if (free_ == kNone) {
+    free_ = static_cast<std::uint32_t>(in_rows_.size());
+    in_rows_.push_back({{}, kNone});
+  }
+  const std::uint32_t at = std::exchange(free_, in_rows_[free_].next);
+  in_rows_[at] = {request, std::exchange(first, at)};
   ++waiting_;
   if (request.polarity > 0) ++waiting_on_[request.x];
 }
@@ -103,18 +105,19 @@ void CircuitReadout::serve(CircuitArray& pixels) {
   const TimeNs t = epoch_ + static_cast<TimeNs>(std::ceil(now));
   const std::size_t begin = read_.size();
   double count = 0;
-  for (std::uint32_t at = std::exchange(first_[row], kNone); at != kNone; at = in_rows_[at].next) {
+  for (std::uint32_t at = std::exchange(first_[row], kNone); at != kNone;) {
     const Event& request = in_rows_[at].request;
     if (request.polarity > 0) --waiting_on_[request.x];
     stamp(pixels, request, t);
     ++count;
+    const std::uint32_t following = std::exchange(in_rows_[at].next, free_);
+    free_ = std::exchange(at, following);
   }
   std::sort(read_.begin() + static_cast<std::ptrdiff_t>(begin), read_.end());
   if (options_.column_coupling > 0) {
     for (std::size_t i = begin; i < read_.size(); ++i) call_rows(read_[i].x, now);
   }
   waiting_ -= static_cast<std::size_t>(count);
-  if (waiting_ == 0) in_rows_.clear();
   free_at_ = now + std::max(1.0, row_time_ + event_time_ * count);
 }
 
@@ -173,8 +176,8 @@ void CircuitReadout::release_until(TimeNs until, std::vector<Event>& out) {
   const auto end = std::ranges::upper_bound(begin, read_.end(), until, {}, &Event::t);
   out.insert(out.end(), begin, end);
   released_ = static_cast<std::size_t>(end - read_.begin());
-  if (released_ < read_.size()) return;
-  read_.clear();
+  if (2 * released_ < read_.size()) return;
+  read_.erase(read_.begin(), read_.begin() + static_cast<std::ptrdiff_t>(released_));
   released_ = 0;
 }
 

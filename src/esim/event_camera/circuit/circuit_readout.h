@@ -52,6 +52,7 @@ class CircuitReadout {
     archive.fixed(self.readings_);
     archive.fixed(self.waiting_on_);
     archive.list(self.in_rows_);
+    archive.value(self.free_);
     archive.list(self.rows_);
     archive.fixed(self.due_);
     archive.value(self.epoch_);
@@ -65,6 +66,7 @@ class CircuitReadout {
 
  private:
   static constexpr TimeNs kNoTime = std::numeric_limits<TimeNs>::max();
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
 
   struct InRow {
     Event request;
@@ -96,6 +98,7 @@ class CircuitReadout {
   std::vector<std::uint32_t> readings_;    // of each row: the number of random numbers it has used
   std::vector<std::uint32_t> waiting_on_;  // waiting ON events of each column
   std::vector<InRow> in_rows_;             // waiting requests, in lists
+  std::uint32_t free_ = kNone;             // head of the list of free places in in_rows_
   std::vector<std::uint32_t> rows_;        // with waiting requests, in the order of their first ones
   std::vector<double> due_;                // of each row: when it can be read, ns after the epoch
   TimeNs epoch_ = kNoTime;                 // time of the first request

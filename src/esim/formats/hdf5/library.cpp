@@ -22,8 +22,8 @@ herr_t hold_index_until_flush(hid_t access_list) {
   return H5Pset_mdc_config(access_list, &config);
 }
 
-// A shuffle before the codec: the high bytes of neighbouring numbers are similar. Bits of integers are shuffled by Blosc,
-// which is half faster than bytes and gives smaller files; floating-point numbers are larger and slower with it.
+// A shuffle before the codec: the high bytes of neighbouring numbers are similar. Bits of integers are shuffled by
+// Blosc, which is half faster than bytes and gives smaller files; floating-point numbers are larger and slower with it.
 herr_t add_filters(hid_t creation_list, Compression compression, hid_t type) {
   switch (compression) {
     case Compression::blosc: {

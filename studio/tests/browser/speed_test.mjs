@@ -150,7 +150,14 @@ test("half a million triangles: flown through in few, rested on in all, picked e
 });
 
 test("events of a changed sensor come within a second", async (context) => {
-  esim("simulate", join(files.folder, "walk.yaml"), "--out", join(files.folder, "kept"), "--set", "output.samples=true");
+  esim(
+    "simulate",
+    join(files.folder, "walk.yaml"),
+    "--out",
+    join(files.folder, "kept"),
+    "--set",
+    "output.samples=true",
+  );
   const server = new Server(files.folder);
   servers.push(server);
   await server.start("walk.yaml");

@@ -4,11 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
 #include <random>
 #include <set>
+#include <utility>
+#include <vector>
 
 #include "esim/core/error.h"
 #include "stats/streams.h"
@@ -186,6 +189,30 @@ std::vector<Event> read_by_rows(const std::vector<Event>& events, double least_u
   }
   std::sort(read.begin(), read.end());
   return read;
+}
+
+TEST(SensorStatistics, CountPairsOfRowsAsByBruteForce) {
+  std::mt19937 random(8);
+  std::vector<std::pair<std::int64_t, std::uint16_t>> events;
+  for (std::int64_t t = 0; events.size() < 3000; t += random() % 3)
+    events.emplace_back(t, static_cast<std::uint16_t>(random() % 5));
+  RowPairs pairs;
+  std::array<std::uint64_t, RowPairs::kLongest_us> expected{};
+  for (std::size_t i = 0; i < events.size(); ++i) {
+    const auto& [t, row] = events[i];
+    pairs.add(t, row);
+    for (std::size_t j = 0; j < i; ++j) {
+      const std::int64_t distance = t - events[j].first;
+      if (events[j].second == row && distance >= 1 && distance <= 128)
+        ++expected[static_cast<std::size_t>(distance - 1)];
+    }
+  }
+  EXPECT_EQ(pairs.counts(), expected);
+
+  RowPairs same;  // a million events of one time stamp do not take forever
+  for (int i = 0; i < 1'000'000; ++i) same.add(5, 3);
+  same.add(7, 3);
+  EXPECT_EQ(same.counts()[1], 1'000'000U);
 }
 
 TEST(SensorStatistics, FindHowLongRowsWait) {

@@ -15,12 +15,13 @@ constexpr double kLeftAtEnd = 0.85;                          // of the pairs, at
 
 void RowPairs::add(std::int64_t t_us, std::uint16_t row) {
   if (row >= recent_.size()) recent_.resize(row + std::size_t{1});
-  std::deque<std::int64_t>& recent = recent_[row];
-  while (!recent.empty() && t_us - recent.front() > static_cast<std::int64_t>(kLongest_us)) recent.pop_front();
-  for (const std::int64_t before : recent) {
-    if (before < t_us) ++counts_[static_cast<std::size_t>(t_us - before - 1)];
+  std::deque<Stamp>& recent = recent_[row];
+  while (!recent.empty() && t_us - recent.front().t_us > static_cast<std::int64_t>(kLongest_us)) recent.pop_front();
+  if (recent.empty() || recent.back().t_us < t_us) recent.push_back({t_us, 0});
+  for (const Stamp& before : recent) {
+    if (before.t_us < t_us) counts_[static_cast<std::size_t>(t_us - before.t_us - 1)] += before.events;
   }
-  recent.push_back(t_us);
+  ++recent.back().events;
 }
 
 RowPairs::Wait RowPairs::wait() const {

@@ -29,8 +29,13 @@ class RowPairs {
   void add(std::int64_t t_us, std::uint16_t row);
 
  private:
+  struct Stamp {
+    std::int64_t t_us = 0;
+    std::uint64_t events = 0;
+  };
+
   std::array<std::uint64_t, kLongest_us> counts_{};
-  std::vector<std::deque<std::int64_t>> recent_;  // times of the last kLongest_us, of each row
+  std::vector<std::deque<Stamp>> recent_;  // time stamps of the last kLongest_us, of each row
 };
 
 }  // namespace esim::inline stats

@@ -131,20 +131,15 @@ class EventVectorEnv(gymnasium.vector.VectorEnv):
     def _begin_again(self, infos):
         """Begins the next episodes of the agents whose episodes are over; the others keep what they have seen."""
         over, self._over = self._over, np.zeros(self.num_envs, bool)
-        last = [self._seen_by(i) if ended else None for i, ended in enumerate(over)]
         final = {"final_obs": np.empty(self.num_envs, object), "_final_obs": over, "final_info": infos, "_final_info": over}
         infos = {name: values.copy() for name, values in infos.items()}
         for i in np.flatnonzero(over):
-            final["final_obs"][i] = deepcopy(last[i])
+            final["final_obs"][i] = deepcopy(self._view.chosen(self._seen[i]))
             self._begin(i)
             self._view.observe(self._seen[i], self._view.events([]), [], self.pose[i])
             infos["t"][i] = infos["known_until"][i] = self._t[i]
             infos["pose"][i], infos["velocity"][i], infos["events_left_out"][i] = self.pose[i], 0, 0
-        return self._batch([self._seen_by(i) for i in range(self.num_envs)]), {**infos, **final}
-
-    def _seen_by(self, i):
-        """What an agent saw last."""
-        return self._view.chosen(self._seen[i])
+        return self._batch([self._view.chosen(seen) for seen in self._seen]), {**infos, **final}
 
     def close_extras(self, **_):
         """Ends all episodes."""

@@ -41,10 +41,10 @@ def rotation_vector(rotations):
 class Motion:
     """Moves bodies for a step. The poses of a step are interval_s apart."""
 
+    size, box = 6, (-1, 1)  # of an action
+
     def __init__(self, interval_s, count, limits):
         self.interval_s, self.count, self.limits = interval_s, count, limits
-
-    size, box = 6, (-1, 1)
 
     @property
     def space(self):

@@ -23,6 +23,7 @@ from ._represent import (
     voxel_grid,
 )
 from ._scenario import Scenario
+from ._sensor import Sensor
 from ._simulation import CameraPacket, LiveSimulation, Packet, Renderer, Report, Simulation, simulate, simulate_live
 from ._trajectory import Trajectory
 from ._types import CAUSES, EVENT_DTYPE, IMU_DTYPE, LABEL_DTYPE, STATE_DTYPE
@@ -48,6 +49,7 @@ __all__ = [
     "Renderer",
     "Report",
     "Scenario",
+    "Sensor",
     "Simulation",
     "Trajectory",
     "__version__",

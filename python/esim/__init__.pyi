@@ -83,6 +83,36 @@ class EventCamera:
     @property
     def delayed(self) -> int: ...
 
+class Sensor:
+    frame_shape: tuple[int, int]
+    margin_px: int
+    def __init__(
+        self,
+        camera: dict[str, Any],
+        preset: str | None = None,
+        *,
+        axes: str = "opencv",
+        supersampling: Int = 1,
+        margin_px: Int = 0,
+        lambda_px: float = 0.5,
+        seed: Int = 0,
+        threads: Int = 0,
+        **options: Any,
+    ) -> None: ...
+    def step(
+        self,
+        t: Time,
+        irradiance: NDArray[np.floating],
+        depth: NDArray[np.floating],
+        pose: ArrayLike | None = None,
+        *,
+        motion: NDArray[np.floating] | None = None,
+        objects: NDArray[np.integer] | None = None,
+        object_poses: dict[int, ArrayLike] | None = None,
+    ) -> Events: ...
+    @property
+    def statistics(self) -> dict[str, float]: ...
+
 def linear_light(image: NDArray[np.uint8] | NDArray[np.uint16]) -> NDArray[np.float32]: ...
 
 class CameraPacket:

@@ -9,6 +9,7 @@ void bind_errors(nanobind::module_& module);
 void bind_scenario(nanobind::module_& module);
 void bind_trajectory(nanobind::module_& module);
 void bind_event_camera(nanobind::module_& module);
+void bind_sensor(nanobind::module_& module);
 void bind_simulation(nanobind::module_& module);
 void bind_event_files(nanobind::module_& module);
 void bind_recording_files(nanobind::module_& module);

@@ -7,6 +7,7 @@ NB_MODULE(_core, module) {
   bind_scenario(module);
   bind_trajectory(module);
   bind_event_camera(module);
+  bind_sensor(module);
   bind_simulation(module);
   bind_event_files(module);
   bind_recording_files(module);

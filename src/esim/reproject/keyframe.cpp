@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdlib>
 #include <limits>
 #include <utility>
 
@@ -31,6 +32,19 @@ Image<float> box_mean(const Image<float>& in, int s, const Workers& workers) {
   return out;
 }
 
+/// Adds a border of one pixel, which mirrors the image at the centres of its outer pixels.
+Image<float> with_border(const Image<float>& in, const Workers& workers) {
+  Image<float> out(in.width() + 2, in.height() + 2);
+  workers.for_each(out.height(), [&](int y) {
+    const auto mirrored = [](int i, int count) { return std::abs(count - 1 - std::abs(count - 1 - (i - 1))); };
+    const float* const from = in.row(mirrored(y, in.height()));
+    float* const to = out.row(y);
+    std::copy_n(from, in.width(), to + 1);
+    to[0] = from[1], to[in.width() + 1] = from[in.width() - 2];
+  });
+  return out;
+}
+
 /// Computes the spline through the square roots of an image of E.
 void to_root(Image<float>& light, const Workers& workers) {
   workers.for_each(light.height(), [&](int y) {
@@ -41,6 +55,7 @@ void to_root(Image<float>& light, const Workers& workers) {
     }
   });
   to_spline_coefficients(light, workers);
+  light = with_border(light, workers);
 }
 
 /// Computes everything that follows from depth.
@@ -95,7 +110,7 @@ void prepare_keyframe(const KeyframeLayout& layout, const PixelRays& rays, bool 
   keyframe.wide.offset = light.wide.empty() ? 0.5F * static_cast<float>(layout.supersampling - 1) : 0.0F;
   if (light.wide.empty()) light.wide = box_mean(light.narrow, layout.supersampling, workers);
   keyframe.wide.root = std::move(light.wide);
-  keyframe.narrow.root = std::move(light.narrow);
+  if (light.look_closely) keyframe.narrow.root = std::move(light.narrow);
   to_root(keyframe.wide.root, workers);
   if (at_infinity) return;
   if (!keyframe.narrow.root.empty()) to_root(keyframe.narrow.root, workers);

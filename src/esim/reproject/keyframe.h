@@ -33,15 +33,16 @@ KeyframeLayout lay_out_keyframes(const Camera& sensor, int supersampling, int ma
 struct KeyframeLight {
   Image<float> wide;    ///< each pixel is the mean over the area of a sensor pixel; if empty, computed from `narrow`
   Image<float> narrow;  ///< each pixel is the mean over its own area; if empty, edges are not looked up more closely
+  bool look_closely = true;  ///< false: `narrow` serves only to compute `wide`
 };
 
 /// A rendered keyframe, prepared for lookups from other views.
 struct Keyframe {
   RenderRequest view;  ///< time, and poses of the camera and of the moving objects
 
-  /// An image of the keyframe's size.
+  /// Images of the keyframe's size.
   struct Light {
-    Image<float> root;   ///< spline coefficients of the square root of E
+    Image<float> root;   ///< spline coefficients of the square root of E, with a border of one pixel
     Image<float> front;  ///< nearness; next to a nearer surface, which E then contains, that of the nearer one
     float offset = 0;    ///< from the pixel that stores a mean to the centre of its area, px to the right and below
   };

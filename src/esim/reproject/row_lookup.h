@@ -37,13 +37,16 @@ void project_row(const Projector<Model>& project, const ViewChange& c, const flo
   }
 }
 
+/// Points are in the image as far as this beyond the centres of its outer pixels, px: rounding errors move them.
+inline constexpr float kOutside = 0.01F;
+
 /// Looks up the points with the spline. `seen` is 1 if a point lies in the image and, with `depth`, on the surface
 /// there.
 template <bool depth>
 void look_up_row(const Keyframe::Light& light, RowLookup& row) {
   const float offset = light.offset;
-  const int stride = light.root.width(), count = static_cast<int>(row.u.size());
-  const float right = static_cast<float>(stride - 1), bottom = static_cast<float>(light.root.height() - 1);
+  const int stride = light.root.width(), count = static_cast<int>(row.u.size());  // with its border
+  const float right = static_cast<float>(stride - 3), bottom = static_cast<float>(light.root.height() - 3);
   const float* const c = light.root.data();
   const float* const near = light.front.data();
   const float *const u = row.u.data(), *const v = row.v.data(), *const w = row.nearness.data();
@@ -52,12 +55,12 @@ void look_up_row(const Keyframe::Light& light, RowLookup& row) {
   for (int x = 0; x < count; ++x) {
     bool same = true;
     const float column = u[x] - offset, line = v[x] - offset;
-    const bool inside = u[x] >= 0 && u[x] <= right && v[x] >= 0 && v[x] <= bottom;
-    const float clamped_column = std::min(std::max(column, 1.0F), right - 1.001F);
-    const float clamped_line = std::min(std::max(line, 1.0F), bottom - 1.001F);
+    const bool inside = u[x] >= -kOutside && u[x] <= right + kOutside && v[x] >= -kOutside && v[x] <= bottom + kOutside;
+    const float clamped_column = std::min(std::max(column, 0.0F), right - 1e-3F);
+    const float clamped_line = std::min(std::max(line, 0.0F), bottom - 1e-3F);
     const int i = static_cast<int>(clamped_column), j = static_cast<int>(clamped_line);
     const CubicSpline across(clamped_column - static_cast<float>(i)), down(clamped_line - static_cast<float>(j));
-    const int r0 = (j - 1) * stride + (i - 1), r1 = r0 + stride, r2 = r1 + stride, r3 = r2 + stride;
+    const int r0 = j * stride + i, r1 = r0 + stride, r2 = r1 + stride, r3 = r2 + stride;
     const float root =
         down(across(c[r0], c[r0 + 1], c[r0 + 2], c[r0 + 3]), across(c[r1], c[r1 + 1], c[r1 + 2], c[r1 + 3]),
              across(c[r2], c[r2 + 1], c[r2 + 2], c[r2 + 3]), across(c[r3], c[r3 + 1], c[r3 + 2], c[r3 + 3]));
@@ -65,8 +68,8 @@ void look_up_row(const Keyframe::Light& light, RowLookup& row) {
     if constexpr (depth) {
       const int k = static_cast<int>(std::min(std::max(u[x], 0.0F), right - 1e-3F));
       const int l = static_cast<int>(std::min(std::max(v[x], 0.0F), bottom - 1e-3F));
-      const int n = l * stride + k;
-      const float w0 = near[n], w1 = near[n + 1], w2 = near[n + stride], w3 = near[n + stride + 1];
+      const int n = l * (stride - 2) + k, below = n + stride - 2;
+      const float w0 = near[n], w1 = near[n + 1], w2 = near[below], w3 = near[below + 1];
       const float low = std::min(std::min(w0, w1), std::min(w2, w3)),
                   high = std::max(std::max(w0, w1), std::max(w2, w3));
       same = w[x] >= low * (1 - kSameSurface) && w[x] <= high * (1 + kSameSurface);

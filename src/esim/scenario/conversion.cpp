@@ -1,5 +1,6 @@
 #include "esim/scenario/conversion.h"
 
+#include "esim/scenario/scenario.h"
 #include "esim/scenario/yaml/yaml_reader.h"
 
 namespace esim::inline scenario {
@@ -14,7 +15,30 @@ void describe(Visitor& visit, EventCameraAlone& o) {
   visit("event_camera", o.event_camera, About{});
 }
 
+/// A camera's size and lens.
+struct Geometry {
+  CameraOptions options;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, Geometry& o) {
+  describe_geometry(visit, o.options);
+}
+
+struct CameraAlone {
+  Geometry camera;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, CameraAlone& o) {
+  visit("camera", o.camera, About{});
+}
+
 }  // namespace
+
+Camera read_camera(const std::vector<std::string>& overrides) {
+  return camera_model(read_overrides<CameraAlone>(overrides, "").camera.options);
+}
 
 EventCameraOptions read_event_camera(const std::vector<std::string>& overrides, const std::string& setter) {
   const std::string prefix = "event_camera.";

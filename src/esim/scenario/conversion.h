@@ -58,6 +58,9 @@ namespace esim::inline scenario {
 /// begins with `setter`, with the key and the valid values.
 EventCameraOptions read_event_camera(const std::vector<std::string>& overrides, const std::string& setter = kSetter);
 
+/// The default camera with overrides "camera.key=value" of its size and its lens. Throws UserError as above.
+Camera read_camera(const std::vector<std::string>& overrides);
+
 /// A camera's options in full as YAML.
 std::string write_event_camera(const EventCameraOptions& options);
 

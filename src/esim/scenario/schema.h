@@ -40,12 +40,9 @@ void describe(Visitor& visit, SensorOptions& o) {
   describe(visit, static_cast<EventCameraOptions&>(o));
 }
 
+/// The size and the lens of a camera.
 template <class Visitor>
-void describe(Visitor& visit, CameraOptions& o) {
-  visit("name", o.name, About{"name, unique within the rig (default: cam0, cam1, ...)"});
-  visit("calibration", o.calibration,
-        About{"calibration file: a Kalibr camchain or a rig file of the original ESIM; gives size, intrinsics, "
-              "distortion and pose of one camera or several"});
+void describe_geometry(Visitor& visit, CameraOptions& o) {
   visit("width", o.width, About{"columns", "px", 1, 16384});
   visit("height", o.height, About{"rows", "px", 1, 16384});
   visit("horizontal_fov_deg", o.horizontal_fov_deg,
@@ -57,6 +54,15 @@ void describe(Visitor& visit, CameraOptions& o) {
   visit("cx", o.cx, About{"principal point, column (default: the middle)", "px", -1e6, 1e6});
   visit("cy", o.cy, About{"principal point, row (default: the middle)", "px", -1e6, 1e6});
   visit("distortion", o.distortion, About{"distortion of the lens"});
+}
+
+template <class Visitor>
+void describe(Visitor& visit, CameraOptions& o) {
+  visit("name", o.name, About{"name, unique within the rig (default: cam0, cam1, ...)"});
+  visit("calibration", o.calibration,
+        About{"calibration file: a Kalibr camchain or a rig file of the original ESIM; gives size, intrinsics, "
+              "distortion and pose of one camera or several"});
+  describe_geometry(visit, o);
   visit("fill_factor", o.fill_factor,
         About{"the part of a pixel's area that sees light, a square in its middle", "", 0.01, 1});
   visit("psf_px", o.psf_px,

@@ -10,8 +10,8 @@
 #include "esim/core/error.h"
 #include "esim/core/fast_log.h"
 #include "esim/core/random.h"
+#include "esim/reproject/disagreement.h"
 #include "esim/reproject/reprojector.h"
-#include "esim/sampling/keyframes/disagreement.h"
 #include "esim/sampling/keyframes/supersampling.h"
 
 namespace esim::inline sampling {

@@ -2,7 +2,7 @@
 
 #include "esim/reproject/reprojector.h"
 
-namespace esim::inline sampling {
+namespace esim::inline reproject {
 
 /// Difference between the predictions of an image by the two keyframes around it: the 99.8th percentile, over blocks of
 /// 8 x 8 pixels, of |mean of L_before - L_after|. Both keyframes must see at least a quarter of a block. The mean
@@ -10,4 +10,4 @@ namespace esim::inline sampling {
 /// reflections.
 double disagreement(const Reconstruction& apart, double log_eps);
 
-}  // namespace esim::inline sampling
+}  // namespace esim::inline reproject

@@ -1,4 +1,4 @@
-#include "esim/sampling/keyframes/disagreement.h"
+#include "esim/reproject/disagreement.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "esim/core/fast_log.h"
 
-namespace esim::inline sampling {
+namespace esim::inline reproject {
 namespace {
 
 constexpr int kBlock = 8;         // px
@@ -39,4 +39,4 @@ double disagreement(const Reconstruction& apart, double log_eps) {
   return blocks[static_cast<std::size_t>(rank)];
 }
 
-}  // namespace esim::inline sampling
+}  // namespace esim::inline reproject

@@ -12,8 +12,10 @@ from ._view import View
 class EventEnv(gymnasium.Env):
     """A camera that an agent moves. Subclasses, or the arguments, define start, reward and end.
 
-    Observations are float32 arrays of what is known by the end of the step: `info["known_until"]`. `info` has `t` (the time
-    of the step's last pose, ns), `known_until` (ns), `pose` (4, 4), `velocity` (3,; m/s, in the world) and
+    Observations are float32 arrays of what is known by the end of the step: `info["known_until"]`. This lags behind `t` by
+    interval_s, and by up to interval_s and the time between two samples (`sampling.min_rate_hz`) more; it does not if
+    sampling is `uniform` at a multiple of the rate of the steps. `info` has `t` (the time of the step's last pose, ns; the body
+    rests for interval_s before the first step), `known_until` (ns), `pose` (4, 4), `velocity` (3,; m/s, in the world) and
     `events_left_out` (the number of events for which the observation "events" had no place). The environment itself has
     `events` (esim.Events) and `packets` of the last step, with ground truth and IMU if the scenario has them.
 

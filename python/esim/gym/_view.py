@@ -90,7 +90,7 @@ class View:
             self.scenario,
             pose,
             interval_s=self.interval_s,
-            packet_s=self.step_s,
+            packet_s=self.interval_s,  # a step ends with the last complete one
             overrides=self.overrides,
             seed=seed,
             threads=threads,

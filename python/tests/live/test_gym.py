@@ -261,3 +261,16 @@ def test_everything_can_be_seen(poster):
         np.testing.assert_array_equal(seen["counts"][i], esim.event_count(env.events[i]))
         surface = esim.time_surface(np.concatenate(events[i]), t=esim.ns(packet.t1))
         np.testing.assert_allclose(seen["time_surface"][i], surface, atol=1e-6)
+
+
+def test_events_stay_near_the_end_of_the_step(poster):
+    # With flow sampling, samples soon leave the times of the steps.
+    overrides = {"duration_s": 2, "sampling": {"type": "flow", "min_rate_hz": 70}}
+    env = make(poster, step_s=0.1, overrides=overrides)
+    env.reset(seed=1)
+    lags_ms = []
+    for k in range(12):
+        *_, info = env.step([0, 0.3 * (-1) ** k, 0, 0, 0, 0.37])
+        lags_ms.append((info["t"] - info["known_until"]) / 1e6)
+    # An interval of the motion for its spline and one for the packet, and the longest interval between samples.
+    assert max(lags_ms) <= 5 + 5 + 1000 / 70

@@ -10,6 +10,7 @@ enum ExitCode : int { kOk = 0, kOurFault = 1, kUsersFault = 2, kInterrupted = 13
 // Each function adds its subcommand to `app`. The subcommand that runs sets `exit_code`.
 void add_simulate(CLI::App& app, int& exit_code);
 void add_resense(CLI::App& app, int& exit_code);
+void add_serve(CLI::App& app, int& exit_code);
 void add_sweep(CLI::App& app, int& exit_code);
 void add_video(CLI::App& app, int& exit_code);
 void add_check(CLI::App& app, int& exit_code);

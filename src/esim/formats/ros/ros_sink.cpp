@@ -28,8 +28,8 @@ std::array<double, 9> isotropic(double variance) { return {variance, 0, 0, 0, va
 class RosSink final : public Sink {
  public:
   RosSink(std::filesystem::path path, Encoding encoding, std::optional<PacketEncoding> packets,
-          std::function<std::unique_ptr<MessageOutput>()> create)
-      : path_(std::move(path)), encoding_(encoding), packets_(packets), create_(std::move(create)) {}
+          std::function<std::unique_ptr<MessageOutput>()> create, bool at_once)
+      : path_(std::move(path)), encoding_(encoding), packets_(packets), create_(std::move(create)), at_once_(at_once) {}
 
   void begin(const RecordingInfo& info) override;
   void write(const Record& record) override;
@@ -66,6 +66,7 @@ class RosSink final : public Sink {
   Encoding encoding_;
   std::optional<PacketEncoding> packets_;
   std::function<std::unique_ptr<MessageOutput>()> create_;
+  bool at_once_;
   std::unique_ptr<MessageOutput> output_;
   RecordingInfo info_;
   std::vector<std::vector<Event>> events_;    // of each camera, not yet written
@@ -145,7 +146,7 @@ void RosSink::put(const EventsRecord& record) {
     const std::size_t count = std::min(static_cast<std::size_t>(late - rest.begin()), kEventsCount - waiting.size());
     waiting.insert(waiting.end(), rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(count));
     rest = rest.subspan(count);
-    if (!rest.empty() || waiting.size() == kEventsCount) flush_events(record.camera);
+    if (!rest.empty() || waiting.size() == kEventsCount || at_once_) flush_events(record.camera);
   }
 }
 
@@ -277,8 +278,8 @@ void RosSink::end(bool) {
 }  // namespace
 
 std::unique_ptr<Sink> make_sink(std::filesystem::path path, Encoding encoding, std::optional<PacketEncoding> packets,
-                                std::function<std::unique_ptr<MessageOutput>()> create) {
-  return std::make_unique<RosSink>(std::move(path), encoding, packets, std::move(create));
+                                std::function<std::unique_ptr<MessageOutput>()> create, bool at_once) {
+  return std::make_unique<RosSink>(std::move(path), encoding, packets, std::move(create), at_once);
 }
 
 Format with_packets(Format format, std::string name, std::string description,

@@ -13,10 +13,10 @@
 namespace esim::inline formats::ros {
 
 /// Writes a recording as ROS messages on the topics of topics.h. `create` makes the file, with messages in `encoding`;
-/// `path` is its name in errors. Events are EventPackets encoded as `packets`; without it, EventArrays. Throws
-/// UserError for times that ROS cannot hold.
+/// `path` is its name in errors. Events are EventPackets encoded as `packets`; without it, EventArrays. `at_once`: no
+/// event waits for later ones. Throws UserError for times that ROS cannot hold.
 std::unique_ptr<Sink> make_sink(std::filesystem::path path, Encoding encoding, std::optional<PacketEncoding> packets,
-                                std::function<std::unique_ptr<MessageOutput>()> create);
+                                std::function<std::unique_ptr<MessageOutput>()> create, bool at_once = false);
 
 /// The variant of a format of messages that writes events as EventPackets: `mono` for times in ns, otherwise `evt3`.
 /// `make` makes its sink.

@@ -32,6 +32,8 @@ constexpr std::array kKnown = {
     Known{MessageType::flow, "esim_msgs/OpticFlow", "1d447e443e01be233472e6f68c671fd7"},
     Known{MessageType::frame_info, "esim_msgs/FrameInfo", "ae9f8dcd7e0bf684080d955778c3ad6f"},
     Known{MessageType::event_packet, "event_camera_msgs/EventPacket", "8a6101b351a64529ac77bd8b71074e52"},
+    Known{MessageType::clock, "rosgraph_msgs/Clock", "a9c97c1d230cfc112e270351a944ee47"},
+    Known{MessageType::odometry, "nav_msgs/Odometry", "cd5e73d190d741a2f92e81eda573aca7"},
     // Other names for the same fields.
     Known{MessageType::events, "prophesee_event_msgs/EventArray", ""},
     Known{MessageType::transforms, "tf/tfMessage", ""},
@@ -83,6 +85,14 @@ const std::vector<Definition>& definitions() {
        "bool is_bigendian\nuint8[] events\n",
        {"std_msgs/Header"}},
 
+      {"rosgraph_msgs/Clock", "time clock\n", {}, "builtin_interfaces/Time clock\n"},
+      {"nav_msgs/Odometry",
+       "std_msgs/Header header\nstring child_frame_id\ngeometry_msgs/PoseWithCovariance pose\n"
+       "geometry_msgs/TwistWithCovariance twist\n",
+       {"std_msgs/Header", "geometry_msgs/PoseWithCovariance", "geometry_msgs/Pose", "geometry_msgs/Point",
+        "geometry_msgs/Quaternion", "geometry_msgs/TwistWithCovariance", "geometry_msgs/Twist",
+        "geometry_msgs/Vector3"}},
+
       {"dvs_msgs/Event",
        "uint16 x\nuint16 y\ntime ts\nbool polarity\n",
        {},
@@ -98,6 +108,8 @@ const std::vector<Definition>& definitions() {
       {"geometry_msgs/Point", "float64 x\nfloat64 y\nfloat64 z\n"},
       {"geometry_msgs/Quaternion", "float64 x\nfloat64 y\nfloat64 z\nfloat64 w\n"},
       {"geometry_msgs/Pose", "geometry_msgs/Point position\ngeometry_msgs/Quaternion orientation\n"},
+      {"geometry_msgs/PoseWithCovariance", "geometry_msgs/Pose pose\nfloat64[36] covariance\n"},
+      {"geometry_msgs/TwistWithCovariance", "geometry_msgs/Twist twist\nfloat64[36] covariance\n"},
       {"geometry_msgs/Twist", "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n"},
       {"geometry_msgs/Accel", "geometry_msgs/Vector3 linear\ngeometry_msgs/Vector3 angular\n"},
       {"geometry_msgs/Transform", "geometry_msgs/Vector3 translation\ngeometry_msgs/Quaternion rotation\n"},

@@ -20,7 +20,9 @@ enum class MessageType {
   transforms,
   flow,
   frame_info,
-  event_packet
+  event_packet,
+  clock,
+  odometry
 };
 
 /// The name in ROS 1: "sensor_msgs/Image".

@@ -100,6 +100,32 @@ struct TwistMessage {
   }
 };
 
+/// rosgraph_msgs/Clock
+struct ClockMessage {
+  TimeNs t = 0;
+
+  template <typename Self, typename Archive>
+  static void fields(Self& self, Archive& archive) {
+    archive.time(self.t);
+  }
+};
+
+/// nav_msgs/Odometry: the pose in the header's frame, the twist in the child's
+struct OdometryMessage {
+  Header header{};
+  std::string child_frame_id{};
+  SE3 pose{};
+  std::array<double, 36> pose_covariance{};
+  Eigen::Vector3d linear = Eigen::Vector3d::Zero(), angular = Eigen::Vector3d::Zero();
+  std::array<double, 36> twist_covariance{};
+
+  template <typename Self, typename Archive>
+  static void fields(Self& self, Archive& archive) {
+    archive(self.header, self.child_frame_id, self.pose.translation, self.pose.rotation, self.pose_covariance);
+    archive(self.linear, self.angular, self.twist_covariance);
+  }
+};
+
 /// geometry_msgs/TransformStamped
 struct TransformMessage {
   Header header{};

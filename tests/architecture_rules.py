@@ -19,6 +19,7 @@ LIBRARIES = {
     r"bzlib\.h": "BZip2::BZip2",
     r"blosc\.h": "Blosc::blosc",
     r"(cairo(-ft)?|ft2build)\.h": "Cairo::Cairo",
+    r"dds/.*": "ros2_dds",
     r"embree[34]/.*": "embree",
     r"epoxy/.*": "Epoxy::epoxy",
     r"hdf5\.h": "HDF5::HDF5",

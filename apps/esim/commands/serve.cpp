@@ -2,11 +2,17 @@
 
 #include <fmt/format.h>
 
+#include <charconv>
 #include <csignal>
+#include <cstdlib>
+#include <cstring>
 #include <filesystem>
+#include <optional>
+#include <system_error>
 #include <thread>
 
 #include "commands.h"
+#include "esim/core/error.h"
 #include "esim/scenario/read.h"
 #include "support.h"
 
@@ -17,7 +23,19 @@ struct ServeArguments : esim::ServeOptions {
   std::string scenario;
   std::vector<std::string> overrides;
   bool quiet = false;
+  bool to_ros2 = false, ros2_network = false;
+  std::optional<int> ros_domain;
 };
+
+/// The domain that other nodes use by default.
+int usual_domain() {
+  const char* const text = std::getenv("ROS_DOMAIN_ID");
+  if (text == nullptr || *text == '\0') return 0;
+  int domain = 0;
+  const auto [end, failure] = std::from_chars(text, text + std::strlen(text), domain);
+  if (failure != std::errc{} || *end != '\0') throw UserError(fmt::format("ROS_DOMAIN_ID: must be a number, not {}", text));
+  return domain;
+}
 
 /// Stops a server when a signal comes. SIGINT, SIGTERM and SIGHUP are blocked in all threads while it exists.
 class StopOnSignal {
@@ -55,7 +73,9 @@ class StopOnSignal {
   std::thread thread_;
 };
 
-int run(const ServeArguments& arguments) {
+int run(ServeArguments& arguments) {
+  if (arguments.to_ros2 || arguments.ros2_network || arguments.ros_domain)
+    arguments.ros2 = {arguments.ros_domain ? *arguments.ros_domain : usual_domain(), arguments.ros2_network};
   const Scenario scenario = read_scenario(std::filesystem::path(arguments.scenario), arguments.overrides);
   StopOnSignal::block();
   Server server(scenario, arguments);
@@ -101,6 +121,11 @@ void add_serve(CLI::App& app, int& exit_code) {
                    "Address to listen on; 0.0.0.0 lets everyone in the network see and control the simulation")
       ->capture_default_str()
       ->type_name("ADDRESS");
+  command->add_flag("--ros2", arguments->to_ros2,
+                    "Also publish to ROS 2, for nodes on this machine (with ROS_LOCALHOST_ONLY=1)");
+  command->add_flag("--ros2-network", arguments->ros2_network, "Also publish to ROS 2, for nodes in the network");
+  command->add_option("--ros-domain", arguments->ros_domain, "Domain of ROS 2 (default: ROS_DOMAIN_ID, or 0)")
+      ->type_name("N");
   command->add_option("-j,--threads", arguments->threads, "Number of threads; 0 uses every processor")
       ->type_name("N")
       ->check(CLI::Range(0, 1024));
@@ -110,7 +135,8 @@ void add_serve(CLI::App& app, int& exit_code) {
       "Examples:\n"
       "  esim serve scenes/poster.yaml --loop\n"
       "  esim serve scenes/room.yaml --speed 0.2                 slow motion\n"
-      "  esim serve scenes/room.yaml --live-pose --set duration_s=3600");
+      "  esim serve scenes/room.yaml --live-pose --set sampling.min_rate_hz=200\n"
+      "  ROS_LOCALHOST_ONLY=1 ros2 topic hz /cam0/events         beside: esim serve scenes/poster.yaml --loop --ros2");
   command->callback([arguments, &exit_code] { exit_code = run(*arguments); });
 }
 

@@ -8,23 +8,9 @@
 #include <variant>
 #include <vector>
 
-#include "esim/core/time.h"
+#include "esim/live/publication.h"
 
 namespace esim::inline live {
-
-/// A topic with messages in ROS 2's encoding (CDR).
-struct Channel {
-  std::string topic{};
-  std::string schema_name{};  ///< "sensor_msgs/msg/Image"
-  std::string schema{};       ///< its definition, with those of all types in it
-  bool latched = false;       ///< new subscribers receive the last message
-};
-
-/// A message that a client publishes.
-struct ClientMessage {
-  std::string topic{}, encoding{}, schema_name{};
-  std::string payload{};
-};
 
 /// A value that clients can read and, perhaps, set.
 struct Parameter {
@@ -35,7 +21,7 @@ struct Parameter {
 /// A WebSocket server of Foxglove's protocol, versions "foxglove.websocket.v1" and "foxglove.sdk.v1"
 /// (github.com/foxglove/ws-protocol), for Foxglove, Lichtblick, PlotJuggler and programs. Clients that read too slowly
 /// lose messages, and are told how many; the server never waits for them.
-class FoxgloveServer {
+class FoxgloveServer final : public Publication {
  public:
   struct Place {
     std::string host = "127.0.0.1";
@@ -55,26 +41,19 @@ class FoxgloveServer {
 
   /// Throws UserError if the address cannot be listened on.
   FoxgloveServer(const Place& place, const Limits& limits, Handlers handlers);
-  ~FoxgloveServer();
+  ~FoxgloveServer() override;
   FoxgloveServer(const FoxgloveServer&) = delete;
   FoxgloveServer& operator=(const FoxgloveServer&) = delete;
 
   int port() const;
 
-  /// Adds a channel, unless there is one of the same topic. Returns its number for publish().
-  std::uint32_t advertise(Channel channel);
-
-  /// Sends a message to the channel's subscribers. From any thread.
-  void publish(std::uint32_t channel, TimeNs t, std::string_view payload);
-
-  /// Sends the simulated time to all clients.
-  void publish_time(TimeNs t);
+  std::uint32_t advertise(Channel channel) override;
+  void publish(std::uint32_t channel, TimeNs t, std::string_view payload) override;
+  void publish_time(TimeNs t) override;
+  std::int64_t dropped() const override;
 
   /// Sends the parameters to the clients that asked for changes.
   void send_parameters();
-
-  /// Number of messages that slow clients have lost.
-  std::int64_t dropped() const;
 
  private:
   struct Impl;

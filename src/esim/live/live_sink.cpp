@@ -20,21 +20,22 @@ namespace ros = formats::ros;
 constexpr TimeNs kPictureInterval = kNsPerSecond / 30;
 constexpr FramePalette kPalette{.on = {0, 92, 230}, .off = {220, 40, 40}, .background = {255, 255, 255}};
 
-/// Sends messages on topics, which become channels of the server.
+/// Sends messages on topics, which become channels of the publications.
 class Publisher final : public ros::MessageOutput {
  public:
-  explicit Publisher(FoxgloveServer& server) : server_(server) {}
+  explicit Publisher(std::vector<Publication*> publications) : publications_(std::move(publications)) {}
 
   void write(const std::string& topic, ros::MessageType type, TimeNs t, std::string_view payload) override {
     auto found = channels_.find(topic);
     if (found == channels_.end()) {
       // What is sent once, or rarely.
       const bool latched = type == ros::MessageType::camera_info || topic == ros::topic::kStaticTransforms;
-      const std::uint32_t channel =
-          server_.advertise({topic, ros::ros2_name_of(type), ros::definition_of(type, ros::Encoding::cdr), latched});
-      found = channels_.emplace(topic, channel).first;
+      const Channel channel{topic, ros::ros2_name_of(type), ros::definition_of(type, ros::Encoding::cdr), latched};
+      std::vector<std::uint32_t> numbers;
+      for (Publication* publication : publications_) numbers.push_back(publication->advertise(channel));
+      found = channels_.emplace(topic, std::move(numbers)).first;
     }
-    server_.publish(found->second, t, payload);
+    for (std::size_t i = 0; i < publications_.size(); ++i) publications_[i]->publish(found->second[i], t, payload);
   }
 
   void close() override {}
@@ -46,15 +47,16 @@ class Publisher final : public ros::MessageOutput {
   }
 
  private:
-  FoxgloveServer& server_;
-  std::map<std::string, std::uint32_t> channels_;
+  std::vector<Publication*> publications_;
+  std::map<std::string, std::vector<std::uint32_t>> channels_;  // of each publication, by topic
   std::string payload_;
 };
 
 /// What recordings do not contain.
 class Additions final : public Sink {
  public:
-  explicit Additions(FoxgloveServer& server) : server_(server), publisher_(server) {}
+  explicit Additions(const std::vector<Publication*>& publications)
+      : publications_(publications), publisher_(publications) {}
 
   void begin(const RecordingInfo& info) override {
     info_ = info;
@@ -97,7 +99,7 @@ class Additions final : public Sink {
   }
 
   void send_odometry(const PoseRecord& pose) {
-    server_.publish_time(pose.t);
+    for (Publication* publication : publications_) publication->publish_time(pose.t);
     publisher_.send("/clock", ros::MessageType::clock, pose.t, ros::ClockMessage{pose.t});
     const Kinematics& body = pose.body;
     ros::OdometryMessage odometry;
@@ -109,7 +111,7 @@ class Additions final : public Sink {
     publisher_.send("/odom", ros::MessageType::odometry, pose.t, odometry);
   }
 
-  FoxgloveServer& server_;
+  std::vector<Publication*> publications_;
   Publisher publisher_;
   RecordingInfo info_;
   std::vector<std::vector<Event>> events_;  // of each camera, since its last picture
@@ -118,12 +120,12 @@ class Additions final : public Sink {
 
 }  // namespace
 
-std::unique_ptr<Sink> make_live_sink(FoxgloveServer& server) {
+std::unique_ptr<Sink> make_live_sink(const std::vector<Publication*>& publications) {
   auto all = std::make_unique<FanOut>();
   all->add(ros::make_sink(
       "the live messages", ros::Encoding::cdr, ros::PacketEncoding::evt3,
-      [&server] { return std::make_unique<Publisher>(server); }, true));
-  all->add(std::make_unique<Additions>(server));
+      [publications] { return std::make_unique<Publisher>(publications); }, true));
+  all->add(std::make_unique<Additions>(publications));
   return all;
 }
 

@@ -5,7 +5,7 @@
 #include <optional>
 
 #include "esim/geometry/se3.h"
-#include "esim/live/foxglove_server.h"
+#include "esim/live/publication.h"
 
 namespace esim::inline live {
 

@@ -33,6 +33,11 @@ struct Server::Impl {
                {.message = [this](const ClientMessage& message) { poses.take(message); },
                 .parameters = [this] { return parameters(); },
                 .set = [this](const Parameter& parameter) { return set(parameter); }}) {
+    publications = {&server};
+    if (options.ros2) {
+      ros2.emplace(*options.ros2, [this](const ClientMessage& message) { poses.take(message); });
+      publications.push_back(&*ros2);
+    }
     if (options.paused) playback.set_paused(true);
   }
 
@@ -48,7 +53,9 @@ struct Server::Impl {
   PoseInput poses;
   std::atomic<std::int64_t> published_turns{0};
   std::chrono::steady_clock::time_point told{};  // the parameters
-  FoxgloveServer server;                         // last: its thread uses the others
+  FoxgloveServer server;  // the threads of these use the others
+  std::optional<Ros2Publication> ros2;
+  std::vector<Publication*> publications;
 };
 
 std::vector<Parameter> Server::Impl::parameters() const {
@@ -59,7 +66,7 @@ std::vector<Parameter> Server::Impl::parameters() const {
           {"restart", false},
           {"time_s", to_seconds(playback.now())},
           {"real_time_factor", playback.real_time_factor()},
-          {"dropped_messages", number(server.dropped())},
+          {"dropped_messages", number(server.dropped() + (ros2 ? ros2->dropped() : 0))},
           {"poses", number(poses.taken())},
           {"refused_poses", number(poses.refused() + published_turns)}};
 }
@@ -100,7 +107,7 @@ Playback::Order Server::Impl::wait_until(TimeNs now) {
 /// Simulates once.
 Playback::Order Server::Impl::follow_trajectory(const Notices& notices) {
   World world = build_world(scenario, options.threads, notices);
-  const std::unique_ptr<Sink> sink = make_live_sink(server);
+  const std::unique_ptr<Sink> sink = make_live_sink(publications);
   playback.begin(world.info.start);
   auto order = Playback::Order::go_on;
   const Summary summary = simulate(world, *sink, [&](const Progress& progress) {
@@ -122,7 +129,7 @@ Playback::Order Server::Impl::follow_clients(const Notices& notices) {
   Scenario lasting = scenario;
   if (!lasting.duration_s) lasting.duration_s = kDay_s;
   World world = build_world(lasting, motion, options.threads, notices);
-  const std::unique_ptr<Sink> sink = make_live_sink(server);
+  const std::unique_ptr<Sink> sink = make_live_sink(publications);
   Simulator simulator(world, *sink);
   playback.begin(world.info.start);
   auto order = Playback::Order::go_on;

@@ -6,11 +6,13 @@
 
 #include "esim/compose/compose.h"
 #include "esim/live/foxglove_server.h"
+#include "esim/live/ros2/ros2_publication.h"
 
 namespace esim::inline live {
 
 struct ServeOptions {
   FoxgloveServer::Place place{};
+  std::optional<Ros2Publication::Options> ros2{};  ///< unset: without ROS 2
   double speed = 1;                ///< simulated seconds per second; 0: as fast as possible
   bool loop = false;               ///< begins again at the end
   bool paused = false;             ///< at the beginning
@@ -25,7 +27,7 @@ struct ServeOptions {
 /// Parameters that clients can set: `paused`; `speed`; `step_s`, to simulate so long and pause; `restart` (true). To
 /// read: `time_s`, `real_time_factor`, `dropped_messages`, `poses`, `refused_poses`.
 ///
-/// With `live_pose`, clients publish geometry_msgs/PoseStamped on /esim/pose or geometry_msgs/TwistStamped on
+/// With `live_pose`, clients of the server, and with `ros2` other nodes, publish geometry_msgs/PoseStamped on /esim/pose or geometry_msgs/TwistStamped on
 /// /esim/twist (of the body, in its own frame), in CDR or JSON. A pose holds until the next; a twist moves the body
 /// from the last pose until another message comes.
 class Server {

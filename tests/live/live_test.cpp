@@ -24,8 +24,7 @@ TEST(Playback, FollowsTheWallClock) {
     Playback playback(speed);
     playback.begin(7);
     const Clock::time_point began = Clock::now();
-    for (int k = 0; k <= 20; ++k)
-      EXPECT_EQ(playback.wait_until(7 + to_ns(0.01 * k * speed)), Playback::Order::go_on);
+    for (int k = 0; k <= 20; ++k) EXPECT_EQ(playback.wait_until(7 + to_ns(0.01 * k * speed)), Playback::Order::go_on);
     EXPECT_GE(seconds_since(began), 0.2);
     EXPECT_LT(seconds_since(began), 1);
     EXPECT_EQ(playback.now(), 7 + to_ns(0.2 * speed));
@@ -87,7 +86,9 @@ std::string in_cdr(const SE3& pose) {
   return payload;
 }
 
-ClientMessage pose_message(const SE3& pose) { return {"/esim/pose", "cdr", "geometry_msgs/msg/PoseStamped", in_cdr(pose)}; }
+ClientMessage pose_message(const SE3& pose) {
+  return {"/esim/pose", "cdr", "geometry_msgs/msg/PoseStamped", in_cdr(pose)};
+}
 
 TEST(PoseInput, PosesHoldAndTwistsMove) {
   PoseInput input(1);
@@ -97,7 +98,8 @@ TEST(PoseInput, PosesHoldAndTwistsMove) {
   const SE3 wanted{so3_exp({0.1, 0, 0.3}), {1.5, 2, 3}};
   input.take(pose_message(wanted));
   for (int k = 0; k < 3; ++k) EXPECT_LT((input.next(start, 0.1).translation - wanted.translation).norm(), 1e-12);
-  input.take({"/esim/twist", "json", "", R"({"linear": {"x": 2, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 1}})"});
+  input.take(
+      {"/esim/twist", "json", "", R"({"linear": {"x": 2, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 1}})"});
   const SE3 moved = input.next(wanted, 0.1);
   EXPECT_LT((moved.translation - (wanted * Eigen::Vector3d(0.2, 0, 0))).norm(), 1e-12);
   EXPECT_LT(so3_log((wanted.rotation * so3_exp({0, 0, 0.1})).conjugate() * moved.rotation).norm(), 1e-9);
@@ -123,7 +125,8 @@ TEST(PoseInput, CountsWhatItRefuses) {
   for (std::size_t size = 0; size < whole.size(); ++size) refuses({"/esim/pose", "cdr", "", whole.substr(0, size)});
   for (const char* text : {"", "{", "3", "[]", "null", R"({"position": {}})", R"({"pose": {"position": {"x": "1"}}})"})
     refuses({"/esim/pose", "json", "", text});
-  refuses({"/esim/twist", "json", "", R"({"linear": {"x": 1e300, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0}})"});
+  refuses(
+      {"/esim/twist", "json", "", R"({"linear": {"x": 1e300, "y": 0, "z": 0}, "angular": {"x": 0, "y": 0, "z": 0}})"});
   input.take({"/other", "json", "", "{}"});
   EXPECT_EQ(input.refused(), refused);
   EXPECT_EQ(input.taken(), 0);

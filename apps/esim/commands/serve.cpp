@@ -33,7 +33,8 @@ int usual_domain() {
   if (text == nullptr || *text == '\0') return 0;
   int domain = 0;
   const auto [end, failure] = std::from_chars(text, text + std::strlen(text), domain);
-  if (failure != std::errc{} || *end != '\0') throw UserError(fmt::format("ROS_DOMAIN_ID: must be a number, not {}", text));
+  if (failure != std::errc{} || *end != '\0')
+    throw UserError(fmt::format("ROS_DOMAIN_ID: must be a number, not {}", text));
   return domain;
 }
 

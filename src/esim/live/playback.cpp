@@ -101,6 +101,13 @@ TimeNs Playback::now() const {
   return now_;
 }
 
+TimeNs Playback::due() const {
+  const std::lock_guard lock(mutex_);
+  if (speed_ <= 0 || (paused_ && !stepping_)) return now_;
+  const std::chrono::duration<double> since = Clock::now() - anchor_wall_;
+  return anchor_ + to_ns(since.count() * speed_);
+}
+
 double Playback::real_time_factor() const {
   const std::lock_guard lock(mutex_);
   return factor_;

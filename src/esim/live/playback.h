@@ -34,9 +34,12 @@ class Playback {
   bool paused() const;
   double speed() const;
 
-  /// The simulated time, and its speed during the last second.
+  /// How far the simulation is, and its speed during the last second.
   TimeNs now() const;
   double real_time_factor() const;
+
+  /// The simulated time that is due now: how far the simulation should be. now() if it is paused or has no speed.
+  TimeNs due() const;
 
  private:
   using Clock = std::chrono::steady_clock;

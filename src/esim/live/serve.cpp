@@ -53,7 +53,7 @@ struct Server::Impl {
   PoseInput poses;
   std::atomic<std::int64_t> published_turns{0};
   std::chrono::steady_clock::time_point told{};  // the parameters
-  FoxgloveServer server;  // the threads of these use the others
+  FoxgloveServer server;                         // the threads of these use the others
   std::optional<Ros2Publication> ros2;
   std::vector<Publication*> publications;
 };
@@ -65,6 +65,7 @@ std::vector<Parameter> Server::Impl::parameters() const {
           {"step_s", 0.0},
           {"restart", false},
           {"time_s", to_seconds(playback.now())},
+          {"clock_s", to_seconds(playback.due())},
           {"real_time_factor", playback.real_time_factor()},
           {"dropped_messages", number(server.dropped() + (ros2 ? ros2->dropped() : 0))},
           {"poses", number(poses.taken())},

@@ -31,7 +31,8 @@ RawData* make(const ddsi_sertype* type, ddsi_serdata_kind kind, std::string byte
   return data;
 }
 
-ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind, const nn_rdata* fragment, std::size_t size) {
+ddsi_serdata* from_fragments(const ddsi_sertype* type, ddsi_serdata_kind kind, const nn_rdata* fragment,
+                             std::size_t size) {
   std::string bytes;
   bytes.reserve(size);
   for (; fragment != nullptr; fragment = fragment->nextfrag) {
@@ -57,7 +58,9 @@ constexpr ddsi_serdata_ops kDataOps = [] {
   ops.get_size = [](const ddsi_serdata* data) { return raw(data).size; };
   ops.from_ser = from_fragments;
   ops.from_ser_iov = from_vectors;
-  ops.from_keyhash = [](const ddsi_sertype* type, const ddsi_keyhash*) -> ddsi_serdata* { return make(type, SDK_KEY, {}); };
+  ops.from_keyhash = [](const ddsi_sertype* type, const ddsi_keyhash*) -> ddsi_serdata* {
+    return make(type, SDK_KEY, {});
+  };
   ops.from_sample = [](const ddsi_sertype* type, ddsi_serdata_kind kind, const void* sample) -> ddsi_serdata* {
     return make(type, kind, kind == SDK_DATA ? *static_cast<const std::string*>(sample) : std::string());
   };

@@ -113,8 +113,8 @@ Ros2Publication::Ros2Publication(const Options& options, std::function<void(cons
   if (!options.network) impl_->domain = dds_create_domain(domain, kThisMachine);
   impl_->participant = impl_->domain < 0 ? impl_->domain : dds_create_participant(domain, nullptr, nullptr);
   if (impl_->participant < 0)
-    throw UserError(fmt::format("ROS 2: DDS does not start in domain {}: {}", options.domain,
-                                dds_strretcode(impl_->participant)));
+    throw UserError(
+        fmt::format("ROS 2: DDS does not start in domain {}: {}", options.domain, dds_strretcode(impl_->participant)));
   impl_->read("/esim/pose", "geometry_msgs/msg/PoseStamped");
   impl_->read("/esim/twist", "geometry_msgs/msg/TwistStamped");
 }
@@ -127,7 +127,8 @@ Ros2Publication::~Ros2Publication() {
 std::uint32_t Ros2Publication::advertise(Channel channel) {
   const std::lock_guard lock(impl_->mutex);
   auto& writers = impl_->writers;
-  const auto found = std::find_if(writers.begin(), writers.end(), [&](const auto& one) { return one.first == channel.topic; });
+  const auto found =
+      std::find_if(writers.begin(), writers.end(), [&](const auto& one) { return one.first == channel.topic; });
   const auto id = static_cast<std::uint32_t>(found - writers.begin() + 1);
   if (found != writers.end()) return id;
   dds_qos_t* const qos = dds_create_qos();
@@ -171,7 +172,8 @@ struct Ros2Publication::Impl {};
 
 bool Ros2Publication::is_available() { return false; }
 Ros2Publication::Ros2Publication(const Options&, std::function<void(const ClientMessage&)>) {
-  throw UserError("this program was built without ROS 2; build esim with -DESIM_ROS2=ON and Cyclone DDS (Debian: cyclonedds-dev)");
+  throw UserError(
+      "this program was built without ROS 2; build esim with -DESIM_ROS2=ON and Cyclone DDS (Debian: cyclonedds-dev)");
 }
 Ros2Publication::~Ros2Publication() = default;
 std::uint32_t Ros2Publication::advertise(Channel) { return 0; }

@@ -15,8 +15,9 @@ import subprocess
 import sys
 import tempfile
 
-import esim
 import numpy as np
+
+import esim
 
 FOLDER = pathlib.Path(__file__).resolve().parent.parent
 SCENES = ("scenes/room.yaml", "tests/scenarios/ball.yaml", "tests/scenarios/furnished_room.yaml")

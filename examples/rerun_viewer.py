@@ -9,9 +9,10 @@ import argparse
 import pathlib
 import sys
 
-import esim
 import numpy as np
 import rerun as rr
+
+import esim
 
 ON, OFF = (0, 92, 230), (220, 40, 40)
 

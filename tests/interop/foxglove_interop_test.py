@@ -11,6 +11,7 @@ from program import need
 need("websockets", "rosbags", "numpy")
 import numpy as np  # noqa: E402
 from rosbags.typesys import Stores, get_typestore  # noqa: E402
+
 from served import SUBPROTOCOLS, Served, Viewer  # noqa: E402
 
 POSE = "geometry_msgs/msg/PoseStamped"

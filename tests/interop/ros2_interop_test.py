@@ -27,6 +27,7 @@ from cyclonedds.pub import DataWriter  # noqa: E402
 from cyclonedds.sub import DataReader  # noqa: E402
 from cyclonedds.topic import Topic  # noqa: E402
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore  # noqa: E402
+
 from served import Served, Viewer  # noqa: E402
 
 DOMAIN = random.Random(os.getpid()).randrange(20, 200)

@@ -1,8 +1,9 @@
 """Tests of esim.Sensor."""
 
-import esim
 import numpy as np
 import pytest
+
+import esim
 
 LENS = {"width": 64, "height": 48, "horizontal_fov_deg": 60}
 F = 32 / np.tan(np.radians(30))

@@ -34,11 +34,12 @@ MADE_FILES = {
     "camchain.yaml": "calibration/camchain.yaml", "imu.yaml": "calibration/imu.yaml",
 }  # fmt: skip
 
-# The program, which simulates a short time and few pixels, and whose studio, with an empty page, ends by itself.
+# The program, which simulates a short time and few pixels, and whose studio, with an empty page, and servers end by themselves.
 PROGRAM = """#!/bin/bash
 case "$1" in
   simulate) exec {program} "$@" {small} ;;
   studio) timeout 2 {program} "$@" --page "$(dirname "$0")" || [ $? = 124 ] ;;
+  serve) timeout 2 {program} "$@" --port 0 || [ $? = 124 ] ;;
   *) exec {program} "$@" ;;
 esac
 """

@@ -37,9 +37,9 @@ int main(int argc, char** argv) {
   int exit_code = kOk;
   add_simulate(app, exit_code);
   add_resense(app, exit_code);
-  add_serve(app, exit_code);
   add_sweep(app, exit_code);
   add_video(app, exit_code);
+  add_serve(app, exit_code);
   add_check(app, exit_code);
   add_convert(app, exit_code);
   add_filter(app, exit_code);

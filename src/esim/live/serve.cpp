@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <cmath>
+#include <memory>
 #include <string>
 #include <utility>
 #include <vector>
@@ -29,15 +30,15 @@ struct Server::Impl {
         options(chosen),
         playback(chosen.speed),
         poses(chosen.max_jump_m),
+        ros2(chosen.ros2 ? std::make_unique<Ros2Publication>(
+                               *chosen.ros2, [this](const ClientMessage& message) { poses.take(message); })
+                         : nullptr),
         server(chosen.place, {},
                {.message = [this](const ClientMessage& message) { poses.take(message); },
                 .parameters = [this] { return parameters(); },
                 .set = [this](const Parameter& parameter) { return set(parameter); }}) {
     publications = {&server};
-    if (options.ros2) {
-      ros2.emplace(*options.ros2, [this](const ClientMessage& message) { poses.take(message); });
-      publications.push_back(&*ros2);
-    }
+    if (ros2) publications.push_back(ros2.get());
     if (options.paused) playback.set_paused(true);
   }
 
@@ -51,10 +52,10 @@ struct Server::Impl {
   ServeOptions options;
   Playback playback;
   PoseInput poses;
-  std::atomic<std::int64_t> published_turns{0};
+  std::atomic<std::int64_t> refused_turns{0};
   std::chrono::steady_clock::time_point told{};  // the parameters
-  FoxgloveServer server;                         // the threads of these use the others
-  std::optional<Ros2Publication> ros2;
+  std::unique_ptr<Ros2Publication> ros2;  // null: without. Its thread uses the poses
+  FoxgloveServer server;                  // its thread uses all above
   std::vector<Publication*> publications;
 };
 
@@ -69,7 +70,7 @@ std::vector<Parameter> Server::Impl::parameters() const {
           {"real_time_factor", playback.real_time_factor()},
           {"dropped_messages", number(server.dropped() + (ros2 ? ros2->dropped() : 0))},
           {"poses", number(poses.taken())},
-          {"refused_poses", number(poses.refused() + published_turns)}};
+          {"refused_poses", number(poses.refused() + refused_turns)}};
 }
 
 std::string Server::Impl::set(const Parameter& parameter) {
@@ -141,7 +142,7 @@ Playback::Order Server::Impl::follow_clients(const Notices& notices) {
       motion->push(wanted);
       body = wanted;
     } catch (const UserError&) {  // a turn of 180 degrees or more
-      ++published_turns;
+      ++refused_turns;
       motion->push(body);
     }
     simulator.advance_until(world.info.end, [](const Progress&) { return true; });

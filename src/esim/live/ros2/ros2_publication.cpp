@@ -47,13 +47,12 @@ std::string dds_name(std::string_view schema_name) {
   return name + "::dds_::" + std::string(schema_name.substr(last + 1)) + "_";
 }
 
-/// The settings of DDS, unless the user's CYCLONEDDS_URI says otherwise: the loopback interface has no multicast, so
-/// that participants look for each other by their numbers.
+/// The settings of DDS for programs on this machine. Others are found by multicast on the loopback interface, as ROS 2
+/// does with ROS_LOCALHOST_ONLY, or by their numbers.
 constexpr const char* kThisMachine =
-    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"127.0.0.1\"/></Interfaces>"
-    "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto</ParticipantIndex>"
-    "<MaxAutoParticipantIndex>60</MaxAutoParticipantIndex><Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery>"
-    "</Domain></CycloneDDS>";
+    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address=\"127.0.0.1\" multicast=\"true\"/></Interfaces>"
+    "</General><Discovery><ParticipantIndex>auto</ParticipantIndex><MaxAutoParticipantIndex>60</MaxAutoParticipantIndex>"
+    "<Peers><Peer address=\"127.0.0.1\"/></Peers></Discovery></Domain></CycloneDDS>";
 
 }  // namespace
 

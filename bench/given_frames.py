@@ -108,7 +108,7 @@ def methods_of(scene, args, scale):
     linear, true = (esim.EventCamera(WIDTH, HEIGHT, **SENSOR) for _ in range(2))
     truth = [true.process(seen_by_sensor(frame[1], scale, margin), esim.ns(int(frame[0])))
              for frame in frames_of(scene, args.seconds, camera, args.truth_rate)]
-    sensors = {name: esim.Sensor(LENS, supersampling=scale, margin_px=margin, **SENSOR)
+    sensors = {name: esim.Sensor(LENS, supersampling=scale, margin_px=margin, lambda_px=args.lambda_px, **SENSOR)
                for name in ("object poses", "motion vectors", "motion vectors, ids")}
     made = {name: [] for name in ("linear", *sensors)}
     earlier = None
@@ -133,6 +133,7 @@ def main():
     parser.add_argument("--rate", type=float, default=100, help="frames per second")
     parser.add_argument("--truth-rate", type=float, default=2000, help="frames per second of the truth")
     parser.add_argument("--supersampling", type=int, nargs="*", default=[1, 2])
+    parser.add_argument("--lambda-px", type=float, default=0.5, help="largest motion between two images that a sensor makes")
     parser.add_argument("scenes", nargs="*", default=SCENES)
     args = parser.parse_args()
     print("| scene | pixels | method | events | missing | additional | time error, median, ms | 95 %, ms |\n|" + 8 * "---|")

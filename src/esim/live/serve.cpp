@@ -54,8 +54,8 @@ struct Server::Impl {
   PoseInput poses;
   std::atomic<std::int64_t> refused_turns{0};
   std::chrono::steady_clock::time_point told{};  // the parameters
-  std::unique_ptr<Ros2Publication> ros2;  // null: without. Its thread uses the poses
-  FoxgloveServer server;                  // its thread uses all above
+  std::unique_ptr<Ros2Publication> ros2;         // null: without. Its thread uses the poses
+  FoxgloveServer server;                         // its thread uses all above
   std::vector<Publication*> publications;
 };
 

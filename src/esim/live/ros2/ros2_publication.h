@@ -14,8 +14,9 @@ namespace esim::inline live {
 class Ros2Publication final : public Publication {
  public:
   struct Options {
-    int domain = 0;        ///< ROS_DOMAIN_ID
-    bool network = false;  ///< as CYCLONEDDS_URI says; false: only programs on this machine, as with ROS_LOCALHOST_ONLY=1
+    int domain = 0;  ///< ROS_DOMAIN_ID
+    bool network =
+        false;  ///< as CYCLONEDDS_URI says; false: only programs on this machine, as with ROS_LOCALHOST_ONLY=1
   };
 
   /// Whether the program was built with DDS.

@@ -75,8 +75,6 @@ struct Ros2Publication::Impl {
   std::vector<std::unique_ptr<Subscription>> subscriptions;
 };
 
-bool Ros2Publication::is_available() { return true; }
-
 dds_entity_t Ros2Publication::Impl::add_topic(const std::string& topic, std::string_view schema_name) const {
   const dds_entity_t made = create_raw_topic(participant, ("rt" + topic).c_str(), dds_name(schema_name).c_str());
   if (made < 0) throw InternalError(fmt::format("ROS 2: cannot create the topic {}: {}", topic, dds_strretcode(made)));
@@ -170,7 +168,6 @@ namespace esim::inline live {
 
 struct Ros2Publication::Impl {};
 
-bool Ros2Publication::is_available() { return false; }
 Ros2Publication::Ros2Publication(const Options&, std::function<void(const ClientMessage&)>) {
   throw UserError(
       "this program was built without ROS 2; build esim with -DESIM_ROS2=ON and Cyclone DDS (Debian: cyclonedds-dev)");

@@ -19,11 +19,9 @@ class Ros2Publication final : public Publication {
         false;  ///< as CYCLONEDDS_URI says; false: only programs on this machine, as with ROS_LOCALHOST_ONLY=1
   };
 
-  /// Whether the program was built with DDS.
-  static bool is_available();
-
   /// `message` receives poses and twists that others publish on /esim/pose and /esim/twist, on a thread of DDS; it must
-  /// not throw. Throws UserError if DDS is not available or cannot start.
+  /// not throw. Throws UserError if the program was built without DDS, or if it
+  /// cannot start.
   Ros2Publication(const Options& options, std::function<void(const ClientMessage&)> message);
   ~Ros2Publication() override;
   Ros2Publication(const Ros2Publication&) = delete;

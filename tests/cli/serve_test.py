@@ -116,10 +116,11 @@ class ServeTest(ProgramTest):
         self.assertGreaterEqual(stepped["time_s"], 0.19)
         self.assertLess(stepped["time_s"], 0.26)
         client.parameters(paused=False, speed=0.5)
-        before = client.parameters()["time_s"]
+        before, began = client.parameters()["time_s"], time.monotonic()
         time.sleep(1)
-        after = client.parameters()["time_s"]
-        self.assertLess(abs(after - before - 0.5), 0.15)
+        after, passed = client.parameters()["time_s"], time.monotonic() - began
+        self.assertLess(after - before, 0.5 * passed + 0.15)
+        self.assertGreater(after - before, 0.1)  # less on a busy machine
         client.parameters(restart=True)
         time.sleep(0.3)
         self.assertLess(client.parameters()["time_s"], 0.25)
@@ -139,7 +140,7 @@ class ServeTest(ProgramTest):
                 client.until("serverInfo")
                 began = time.monotonic()
                 self.assertEqual(self.end(sent)[0], 0)
-                self.assertLess(time.monotonic() - began, 3)
+                self.assertLess(time.monotonic() - began, 10)
 
     def test_slow_clients_lose_messages_and_delay_nobody(self):
         port = self.serve("--loop", "--set", "camera.width=346", "--set", "camera.height=260", "--set", "truth.rate_hz=60")

@@ -8,53 +8,19 @@ standard library alone.
 """
 
 import argparse
-import base64
 import json
 import math
-import os
 import pathlib
 import signal
-import socket
 import struct
 import subprocess
+import sys
 import threading
 import time
 
 FOLDER = pathlib.Path(__file__).resolve().parent.parent
-
-
-class Client:
-    """A WebSocket client."""
-
-    def __init__(self, port):
-        self.socket, self.rest = socket.create_connection(("127.0.0.1", port)), b""
-        self.socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        key = base64.b64encode(os.urandom(16)).decode()
-        self.socket.sendall(
-            f"GET / HTTP/1.1\r\nHost: localhost\r\nUpgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Key: {key}\r\n"
-            "Sec-WebSocket-Version: 13\r\nSec-WebSocket-Protocol: foxglove.websocket.v1\r\n\r\n".encode())
-        while b"\r\n\r\n" not in self.rest:
-            self.rest += self.socket.recv(4096)
-        self.rest = self.rest.split(b"\r\n\r\n", 1)[1]
-
-    def take(self, count):
-        while len(self.rest) < count:
-            data = self.socket.recv(1 << 20)
-            if not data:
-                raise EOFError
-            self.rest += data
-        taken, self.rest = self.rest[:count], self.rest[count:]
-        return taken
-
-    def receive(self):
-        code, size = self.take(2)
-        size = struct.unpack(">H", self.take(2))[0] if size == 126 else struct.unpack(">Q", self.take(8))[0] if size == 127 else size
-        payload = self.take(size)
-        return json.loads(payload) if code & 15 == 1 else payload
-
-    def send(self, payload, code=1):
-        size = bytes([128 | len(payload)]) if len(payload) < 126 else b"\xfe" + struct.pack(">H", len(payload))
-        self.socket.sendall(bytes([128 | code]) + size + bytes(4) + payload)
+sys.path.insert(0, str(FOLDER / "tests/cli"))
+from websocket_client import WebSocketClient  # noqa: E402
 
 
 class Listener(threading.Thread):
@@ -77,7 +43,7 @@ class Listener(threading.Thread):
             for channel in message.get("channels", []):
                 if channel["topic"] in ("/cam0/events", "/odom"):
                     wanted = {"id": 1 if channel["topic"] == "/odom" else 0, "channelId": channel["id"]}
-                    self.client.send(json.dumps({"op": "subscribe", "subscriptions": [wanted]}).encode())
+                    self.client.send_frame(json.dumps({"op": "subscribe", "subscriptions": [wanted]}).encode(), 1)
             if message["op"] == "parameterValues" and message.get("id") == "time":
                 self.answers.append((now - self.asked, 0.5 * (now + self.asked) - message["parameters"][0]["value"]))
         elif message[:1] == b"\x01":
@@ -93,22 +59,22 @@ def measure(program, scenario, seconds, options):
     command = [program, "serve", scenario, "--live-pose", "--port", "0", *options]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
     try:
-        client = Client(int(process.stdout.readline().strip().rsplit(":", 1)[1]))
+        client = WebSocketClient(int(process.stdout.readline().strip().rsplit(":", 1)[1]))
         listener = Listener(client)
         listener.start()
         while listener.pose is None:
             time.sleep(0.05)
-        client.send(json.dumps({"op": "advertise", "channels": [{"id": 1, "topic": "/esim/pose", "encoding": "json",
-                                                                 "schemaName": "geometry_msgs/msg/PoseStamped"}]}).encode())
+        client.send_frame(json.dumps({"op": "advertise", "channels": [{"id": 1, "topic": "/esim/pose", "encoding": "json",
+                                                                 "schemaName": "geometry_msgs/msg/PoseStamped"}]}).encode(), 1)
         x, y, z, *q = listener.pose
         began = time.perf_counter()
         for k in range(round(200 * seconds)):
             side = 0.3 * math.sin(math.pi * (time.perf_counter() - began))
             pose = {"position": {"x": x, "y": y + side, "z": z}, "orientation": dict(zip("xyzw", q))}
-            client.send(b"\x01" + struct.pack("<I", 1) + json.dumps({"pose": pose}).encode(), 2)
+            client.send_frame(b"\x01" + struct.pack("<I", 1) + json.dumps({"pose": pose}).encode(), 2)
             if k % 7 == 0:
                 listener.asked = time.perf_counter()
-                client.send(json.dumps({"op": "getParameters", "parameterNames": ["clock_s"], "id": "time"}).encode())
+                client.send_frame(json.dumps({"op": "getParameters", "parameterNames": ["clock_s"], "id": "time"}).encode(), 1)
             time.sleep(max(0, began + (k + 1) / 200 - time.perf_counter()))
         _, ahead_s = min(listener.answers)  # the quickest answer is the most exact
         return sorted(1e3 * (arrival - ahead_s - t) for arrival, t in listener.packets if arrival > began + 1)

@@ -17,7 +17,7 @@ import tempfile
 import threading
 import time
 
-from serve_latency import FOLDER, Client
+from serve_latency import FOLDER, WebSocketClient
 
 SCENARIO = f"""
 renderer: {{type: plane, image: {FOLDER}/scenes/poster/poster.jpg, width_m: 1.2, pose: {{position: [1, 0, 0], look_at: [2, 0, 0]}}}}
@@ -32,7 +32,7 @@ truth: {{rate_hz: 10, pose_rate_hz: 100}}
 def subscribe_to_all(client, message):
     for channel in message["channels"]:
         wanted = {"id": channel["id"], "channelId": channel["id"]}
-        client.send(json.dumps({"op": "subscribe", "subscriptions": [wanted]}).encode())
+        client.send_frame(json.dumps({"op": "subscribe", "subscriptions": [wanted]}).encode(), 1)
 
 
 class Reader(threading.Thread):
@@ -70,7 +70,7 @@ def main():
         try:
             port = int(process.stdout.readline().strip().rsplit(":", 1)[1])
             time.sleep(3)
-            reader, idle = Reader(Client(port)), Client(port)
+            reader, idle = Reader(WebSocketClient(port)), WebSocketClient(port)
             reader.start()
             while not isinstance(message := idle.receive(), dict) or message["op"] != "advertise":
                 pass
@@ -78,7 +78,7 @@ def main():
             began, kib = time.monotonic(), []
             while (passed := time.monotonic() - began) < seconds:
                 kib.append(4 * int(pathlib.Path(f"/proc/{process.pid}/statm").read_text().split()[1]))
-                reader.client.send(json.dumps({"op": "getParameters", "parameterNames": [], "id": "state"}).encode())
+                reader.client.send_frame(json.dumps({"op": "getParameters", "parameterNames": [], "id": "state"}).encode(), 1)
                 print(f"{passed:6.0f} s  {kib[-1]} KiB  read {reader.bytes / 1e9:.2f} GB  {reader.state}", flush=True)
                 time.sleep(min(30, seconds / 20))
         finally:

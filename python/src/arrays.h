@@ -66,6 +66,11 @@ struct ImuSample {
 
 ImuSample to_imu_sample(TimeNs t, const InertialSignals& measured, const InertialSignals& bias);
 
+/// The pose of a homogeneous matrix of 16 numbers, row by row. Throws UserError if it is not rigid.
+inline SE3 pose_in(const double* matrix) {
+  return SE3::from_matrix(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(matrix));
+}
+
 /// A homogeneous matrix, row by row.
 void append_matrix(const SE3& pose, std::vector<double>& out);
 

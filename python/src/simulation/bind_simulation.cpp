@@ -38,10 +38,7 @@ void make_simulation(Simulation* self, const CheckedScenario& scenario, const st
 
 using Matrix = nb::ndarray<const double, nb::shape<4, 4>, nb::c_contig, nb::device::cpu>;
 
-SE3 matrix_at(const double* values) {
-  return SE3::from_matrix(Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values));
-}
-SE3 pose_of(const Matrix& matrix) { return matrix_at(matrix.data()); }
+SE3 pose_of(const Matrix& matrix) { return pose_in(matrix.data()); }
 
 /// A scene that several simulations share, and the threads on which they run.
 struct SharedScene {
@@ -73,7 +70,7 @@ nb::list step_together(const std::vector<Simulation*>& simulations, const Poses&
     const nb::gil_scoped_release released;
     scene.workers->for_each(static_cast<int>(simulations.size()), [&](int i) {
       const auto k = static_cast<std::size_t>(i);
-      for (std::size_t j = 0; j < count; ++j) simulations[k]->push(matrix_at(poses.data() + 16 * (count * k + j)));
+      for (std::size_t j = 0; j < count; ++j) simulations[k]->push(pose_in(poses.data() + 16 * (count * k + j)));
       packets[k] = simulations[k]->catch_up();
     });
   }

@@ -31,9 +31,8 @@ Image<T> image_of(const T* from, std::size_t height, std::size_t width) {
 std::vector<SE3> poses_in(const Matrices& matrices, const char* name) {
   std::vector<SE3> poses;
   for (std::size_t i = 0; i < matrices.shape(0); ++i) {
-    using Matrix = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
     try {
-      poses.push_back(SE3::from_matrix(Eigen::Map<const Matrix>(matrices.data() + 16 * i)));
+      poses.push_back(pose_in(matrices.data() + 16 * i));
     } catch (const UserError& error) {
       throw UserError(std::string(name) + ": " + error.what());
     }

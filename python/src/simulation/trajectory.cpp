@@ -36,9 +36,8 @@ SharedTrajectory from_matrices(const Times& times, const Matrices& matrices, int
                                double smoothing_time_s) {
   std::vector<TimedPose> poses(times.size());
   for (std::size_t i = 0; i < poses.size(); ++i) {
-    using Matrix = Eigen::Matrix<double, 4, 4, Eigen::RowMajor>;
     try {
-      poses[i] = {times.data()[i], SE3::from_matrix(Eigen::Map<const Matrix>(matrices.data() + 16 * i))};
+      poses[i] = {times.data()[i], pose_in(matrices.data() + 16 * i)};
     } catch (const UserError& error) {
       throw UserError("pose " + std::to_string(i) + ": " + error.what());
     }

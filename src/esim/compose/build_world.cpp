@@ -407,6 +407,11 @@ std::shared_ptr<const LoadedScene> load_scene(const Scenario& scenario, const No
   return std::make_shared<const LoadedScene>(LoadedScene{std::move(scene), std::move(renderers)});
 }
 
+std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const LoadedScene& loaded,
+                                                   const Notices& notices) {
+  return build_trajectory(scenario, loaded.scene, notices);
+}
+
 World build_world(const Scenario& scenario, const LoadedScene& loaded, std::shared_ptr<const Trajectory> body,
                   int threads, const Notices& notices) {
   if (!scenario.duration_s) throw UserError("duration_s: is missing; an online motion does not define one");

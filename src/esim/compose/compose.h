@@ -110,6 +110,10 @@ SceneFile load_scenes(const Scenario& scenario, SceneLook look, const Notices& n
 std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const SceneFile& scene,
                                                    const Notices& notices);
 
+/// The same with the scene of a scenario with the same renderer.
+std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const LoadedScene& loaded,
+                                                   const Notices& notices);
+
 /// The camera of the scene file that the scenario's trajectory follows; null for trajectories of other types. Throws
 /// UserError with the names of the cameras in the file.
 const SceneCamera* followed_camera(const Scenario& scenario, const SceneFile& scene);

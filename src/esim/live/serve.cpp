@@ -54,6 +54,7 @@ struct Server::Impl {
   PoseInput poses;
   std::atomic<std::int64_t> refused_turns{0};
   std::chrono::steady_clock::time_point told{};  // the parameters
+  std::shared_ptr<const LoadedScene> scene;      // if clients move the body; loaded once
   std::unique_ptr<Ros2Publication> ros2;         // null: without. Its thread uses the poses
   FoxgloveServer server;                         // its thread uses all above
   std::vector<Publication*> publications;
@@ -122,15 +123,15 @@ Playback::Order Server::Impl::follow_trajectory(const Notices& notices) {
 
 /// Simulates once a body that clients move. Its pose at a time is the one that they want at that time of the clock.
 Playback::Order Server::Impl::follow_clients(const Notices& notices) {
-  const SceneFile scene = load_scenes(scenario, SceneLook::luminance, {[](const auto&) {}, [](const auto&) {}});
-  const std::shared_ptr<const Trajectory> planned = build_trajectory(scenario, scene, notices);
+  if (scene == nullptr) scene = load_scene(scenario, notices);
+  const std::shared_ptr<const Trajectory> planned = build_trajectory(scenario, *scene, notices);
   SE3 body = planned->at(planned->start()).T_world_body;
   poses.begin(body);
   const TimeNs interval = to_ns(options.pose_interval_s);
   const auto motion = std::make_shared<OnlineTrajectory>(OnlineMotionOptions{.start = 0, .interval = interval}, body);
   Scenario lasting = scenario;
   if (!lasting.duration_s) lasting.duration_s = kDay_s;
-  World world = build_world(lasting, motion, options.threads, notices);
+  World world = build_world(lasting, *scene, motion, options.threads, notices);
   const std::unique_ptr<Sink> sink = make_live_sink(publications);
   Simulator simulator(world, *sink);
   playback.begin(world.info.start);

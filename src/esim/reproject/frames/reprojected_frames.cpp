@@ -267,7 +267,8 @@ void ReprojectedFrames::fill(const Motion& motion, const PosedFrame& frame,
   const auto steps = static_cast<TimeNs>(std::max(1.0, std::min(std::ceil(moved / options_.lambda), std::floor(most))));
 
   Image<float> true_end = seen_by_sensor(frame);
-  const Correction correction(*this, motion, forth, back, true_end);
+  std::optional<Correction> correction;  // of the images before the last, which is known
+  if (steps > 1) correction.emplace(*this, motion, forth, back, true_end);
   const Camera& sensor = layout().sensor;
   TimeNs reached = motion.begin;
   for (TimeNs step = 1; step <= steps; ++step) {
@@ -278,7 +279,7 @@ void ReprojectedFrames::fill(const Motion& motion, const PosedFrame& frame,
       reprojector_.reconstruct(before_, after_, motion.at(t), Detail::whole, end_);
       ++statistics_.reconstructions;
       unseen_pixels_ += static_cast<double>(end_.unseen);
-      correction.apply(static_cast<float>(share), end_.irradiance);
+      correction->apply(static_cast<float>(share), end_.irradiance);
     } else {
       end_.irradiance = true_end;
     }

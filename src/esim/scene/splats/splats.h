@@ -1,0 +1,45 @@
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <vector>
+
+namespace esim::inline scene {
+
+/// How splats were widened in the image while the model was trained, and how they are widened when it is rendered. The
+/// variances are those of gsplat (0.3 px²) and of Mip-Splatting (0.1 px²).
+enum class SplatFilter {
+  dilated,      ///< by 0.3 px² with unchanged opacity, as by the original 3D Gaussian splatting
+  antialiased,  ///< by 0.3 px², and the opacity falls as the splat grows
+  mip,          ///< by 0.1 px², and the opacity falls as the splat grows
+};
+
+/// The colours of splats.
+enum class SplatLight {
+  display,  ///< sRGB, 1 = white of a display: models that are trained on photographs
+  linear,   ///< linear light
+};
+
+/// A scene of three-dimensional Gaussians. All arrays have an entry per splat.
+struct Splats {
+  std::vector<Eigen::Vector3f> positions;   ///< of their centres, m
+  std::vector<Eigen::Vector3f> deviations;  ///< standard deviations along their own axes, m, not negative
+  std::vector<Eigen::Vector4f> rotations;   ///< unit quaternions x y z w, from their own axes to the scene's
+  std::vector<float> opacities;             ///< at their centres, from 0 to 1
+
+  /// Degree of the spherical harmonics, 0 to 3.
+  int degree = 0;
+
+  /// (degree + 1)² coefficients per splat of red, green and blue:
+  /// harmonics[(splat * (degree + 1)² + coefficient) * 3 + colour]. The colour seen in the direction d, from the camera
+  /// to the splat, is max(0, 0.5 + Σ_k harmonics_k Y_k(d)).
+  std::vector<float> harmonics;
+
+  SplatFilter filter = SplatFilter::dilated;  ///< as the file says
+  SplatLight light = SplatLight::display;     ///< as the file says
+
+  std::size_t size() const { return positions.size(); }
+  std::size_t coefficients() const { return static_cast<std::size_t>((degree + 1) * (degree + 1)); }
+};
+
+}  // namespace esim::inline scene

@@ -3,6 +3,7 @@
 #include <vector>
 
 #include "esim/files/output_file.h"
+#include "esim/files/zip_reader.h"
 #include "esim/formats/datasets/files_input.h"
 #include "esim/formats/datasets/files_output.h"
 #include "esim/formats/zip_archive.h"

@@ -5,6 +5,7 @@
 
 #include "esim/core/error.h"
 #include "esim/files/output_file.h"
+#include "esim/files/zip_reader.h"
 #include "esim/formats/events_writer.h"
 #include "esim/formats/label_columns.h"
 #include "esim/formats/numpy/npy.h"

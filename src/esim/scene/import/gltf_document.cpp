@@ -68,6 +68,21 @@ float as_float(const std::byte* from, int type) {
   }
 }
 
+float as_integer(const std::byte* from, int type) {
+  switch (type) {
+    case kByte:
+      return static_cast<float>(load<std::int8_t>(from));
+    case kUnsignedByte:
+      return static_cast<float>(load<std::uint8_t>(from));
+    case kShort:
+      return static_cast<float>(load<std::int16_t>(from));
+    case kUnsignedShort:
+      return static_cast<float>(load<std::uint16_t>(from));
+    default:
+      return static_cast<float>(load<std::uint32_t>(from));
+  }
+}
+
 /// Whether a number is finite, also in single precision.
 bool is_finite_number(const Json& value) {
   return value.is_number() && std::abs(value.get<double>()) <= double{std::numeric_limits<float>::max()};
@@ -259,18 +274,29 @@ std::vector<float> GltfDocument::floats(std::size_t index_of_accessor, std::size
   const Accessor from = accessor(index_of_accessor, components);
   if (from.component_type != kFloat && !from.normalised)
     fail(fmt::format("is damaged: accessor {} contains integers instead of floats", index_of_accessor));
+  std::vector<float> values = unchecked_floats(index_of_accessor, components);
+  if (!std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); }))
+    fail(fmt::format("accessor {} contains a number that is not finite", index_of_accessor));
+  return values;
+}
+
+std::vector<float> GltfDocument::unchecked_floats(std::size_t index_of_accessor, std::size_t components) const {
+  const Accessor from = accessor(index_of_accessor, components);
   const std::size_t step = component_bytes(from.component_type);
+  const auto convert = from.component_type == kFloat || from.normalised ? as_float : as_integer;
   std::vector<float> values;
   values.reserve(from.count * components);
   for (std::size_t i = 0; i < from.count; ++i) {
-    for (std::size_t c = 0; c < components; ++c) {
-      const float value = as_float(&from.bytes[i * from.stride + c * step], from.component_type);
-      if (!std::isfinite(value))
-        fail(fmt::format("accessor {} contains a number that is not finite", index_of_accessor));
-      values.push_back(value);
-    }
+    for (std::size_t c = 0; c < components; ++c)
+      values.push_back(convert(&from.bytes[i * from.stride + c * step], from.component_type));
   }
   return values;
+}
+
+std::size_t GltfDocument::bytes() const {
+  std::size_t sum = 0;
+  for (const std::vector<std::byte>& buffer : buffers_) sum += buffer.size();
+  return sum;
 }
 
 std::vector<std::uint32_t> GltfDocument::integers(std::size_t index_of_accessor) const {

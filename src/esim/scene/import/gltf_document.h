@@ -44,6 +44,15 @@ class GltfDocument {
   /// The elements of an accessor of floating-point (or normalised integer) vectors, concatenated, all finite.
   std::vector<float> floats(std::size_t accessor, std::size_t components) const;
 
+  /// As floats(), but the numbers need not be finite, and integers need not be normalised.
+  std::vector<float> unchecked_floats(std::size_t accessor, std::size_t components) const;
+
+  /// The number of elements that an accessor states; it is not checked.
+  std::size_t element_count(std::size_t accessor) const { return whole(list("accessors")[accessor], "count", 0); }
+
+  /// The bytes of all buffers.
+  std::size_t bytes() const;
+
   /// The elements of an accessor of unsigned integers.
   std::vector<std::uint32_t> integers(std::size_t accessor) const;
 

@@ -15,7 +15,8 @@ namespace esim::inline scene {
 ///  - .spz, versions 1 to 4;
 ///  - .sog, versions 1 and 2, as a ZIP file, or its meta.json in a folder;
 ///  - glTF (.glb, .gltf) with KHR_gaussian_splatting.
-/// Positions are in the file's own axes (.spz: converted to right, down, forward, as the others have them).
+/// Positions are in the file's own axes, which usually are right, down, forward; those of .spz are converted to these.
+/// glTF is as in other scenes: z is up, and the transforms of nodes are applied, with their uniform scales.
 ///
 /// Splats with numbers that are not finite, with a rotation of zero, or with a standard deviation above 1e6 m are
 /// dropped, with a warning that counts them. Throws UserError, naming the file, if it cannot be read, is damaged or

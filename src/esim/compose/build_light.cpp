@@ -32,9 +32,9 @@ bool flickers(const Scenario& scenario) {
   const auto has_flicker = [](const auto& objects) {
     return std::ranges::any_of(objects, [](const auto& object) { return object.flicker.has_value(); });
   };
-  const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
+  const auto* const objects = listed_objects(scenario.renderer);
   const auto* const sprites = std::get_if<SpritesRendererOptions>(&scenario.renderer);
-  return scenario.light.flicker || (mesh != nullptr && has_flicker(mesh->objects)) ||
+  return scenario.light.flicker || (objects != nullptr && has_flicker(*objects)) ||
          (sprites != nullptr && has_flicker(sprites->sprites));
 }
 
@@ -54,9 +54,9 @@ std::optional<Flicker> build_flicker(const Scenario& scenario, const CameraOptio
   std::optional<Modulation> all;
   if (scenario.light.flicker) all.emplace(*scenario.light.flicker, start, accuracy, "light.flicker");
   SceneLight light(std::move(all));
-  if (const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer)) {
-    if (moving >= mesh->objects.size())  // otherwise, a custom renderer replaces that of the scenario
-      add_sources(mesh->objects, "objects", moving - mesh->objects.size() + 1, start, accuracy, light);
+  if (const auto* const objects = listed_objects(scenario.renderer)) {
+    if (moving >= objects->size())  // otherwise, a custom renderer replaces that of the scenario
+      add_sources(*objects, "objects", moving - objects->size() + 1, start, accuracy, light);
   }
   if (const auto* const sprites = std::get_if<SpritesRendererOptions>(&scenario.renderer))
     add_sources(sprites->sprites, "sprites", 1, start, accuracy, light);

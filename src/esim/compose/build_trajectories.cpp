@@ -206,19 +206,21 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
     for (std::size_t i = 0; i < objects->size(); ++i)
       trajectories.push_back(build_for_object((*objects)[i].trajectory, i, scenario, span, simulated, notices));
   }
+  const auto* const listed = listed_objects(scenario.renderer);
+  if (listed == nullptr) return trajectories;
   const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
-  if (mesh == nullptr) return trajectories;
+  const double time_scale = mesh != nullptr ? mesh->time_scale : 1;
   std::size_t animated = 0;
   for (const SceneObject& object : scene.scene.objects) {
     if (!object.moves || animated == scene.motions.size()) continue;
     auto animation =
-        fit_animation(scene.motions[animated++], body.start(), mesh->time_scale, "object " + object.name, notices);
+        fit_animation(scene.motions[animated++], body.start(), time_scale, "object " + object.name, notices);
     if (animation->end() < simulated.end)
       animation = std::make_shared<const RestingTrajectory>(std::move(animation), simulated.end);
     trajectories.push_back(std::move(animation));
   }
-  for (std::size_t i = 0; i < mesh->objects.size(); ++i)
-    trajectories.push_back(build_for_object(mesh->objects[i].trajectory, i, scenario, span, simulated, notices));
+  for (std::size_t i = 0; i < listed->size(); ++i)
+    trajectories.push_back(build_for_object((*listed)[i].trajectory, i, scenario, span, simulated, notices));
   return trajectories;
 }
 

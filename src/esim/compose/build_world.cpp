@@ -363,9 +363,9 @@ bool seed_determines_more_than_events(const Scenario& scenario) {
     return std::holds_alternative<RandomTrajectoryOptions>(trajectory);
   };
   const auto moves_randomly = [&](const auto& object) { return is_random(object.trajectory); };
-  const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
+  const auto* const listed = listed_objects(scenario.renderer);
   const auto* const objects = engine_objects(scenario.renderer);
-  return is_random(scenario.trajectory) || (mesh != nullptr && std::ranges::any_of(mesh->objects, moves_randomly)) ||
+  return is_random(scenario.trajectory) || (listed != nullptr && std::ranges::any_of(*listed, moves_randomly)) ||
          (objects != nullptr && std::ranges::any_of(*objects, moves_randomly)) || scenario.imu ||
          std::ranges::any_of(scenario.cameras,
                              [](const CameraOptions& camera) { return camera.frame_camera.has_value(); });

@@ -3,6 +3,7 @@
 #include "esim/blender/blender.h"
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
+#include "esim/scene/splats/splat_file.h"
 
 namespace esim::inline compose {
 namespace {
@@ -36,24 +37,66 @@ std::filesystem::path readable(const std::filesystem::path& scene, const Notices
   return glb;
 }
 
-SceneFile load(const MeshRendererOptions& options, SceneLook look, const Notices& notices) {
-  require_scene_path(options.scene, "scene");
-  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning, look);
-  notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
-  for (std::size_t i = 0; i < options.objects.size(); ++i) {
-    const ObjectOptions& object = options.objects[i];
-    require_scene_path(object.scene, fmt::format("objects.{}.scene", i));
-    SceneObject loaded{object.name.empty() ? fmt::format("object{}", i) : object.name,
-                       load_mesh(readable(object.scene, notices), notices.warning, look), true};
+/// Loads splats with the options of their renderer.
+std::shared_ptr<const Splats> splats_of(const std::filesystem::path& path, double scale,
+                                        const SplatsRendererOptions& options, const Notices& notices) {
+  Splats splats = load_splats(path, notices.warning);
+  for (Eigen::Vector3f& position : splats.positions) position *= static_cast<float>(scale);
+  for (Eigen::Vector3f& deviation : splats.deviations) deviation *= static_cast<float>(scale);
+  if (options.filter) splats.filter = *options.filter;
+  if (options.light) splats.light = *options.light;
+  notices.note(fmt::format("scene {}: {}", path.filename().string(), summary(splats)));
+  return std::make_shared<const Splats>(std::move(splats));
+}
+
+/// Loads an object: a mesh, or splats for a renderer with these.
+SceneObject load_object(const ObjectOptions& options, const SplatsRendererOptions* with_splats, SceneLook look,
+                        const Notices& notices) {
+  SceneObject object{options.name, {}, true};
+  if (with_splats != nullptr && is_splat_file(options.scene)) {
+    object.splats = splats_of(options.scene, options.scale, *with_splats, notices);
+    return object;
+  }
+  object.mesh = load_mesh(readable(options.scene, notices), notices.warning, look);
+  for (Eigen::Vector3f& vertex : object.mesh.vertices) vertex *= static_cast<float>(options.scale);
+  return object;
+}
+
+/// Adds the objects that a scenario lists.
+void add_objects(const std::vector<ObjectOptions>& objects, const LightingOptions& lighting,
+                 const SplatsRendererOptions* with_splats, SceneLook look, const Notices& notices, SceneFile& file) {
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    require_scene_path(objects[i].scene, fmt::format("objects.{}.scene", i));
+    SceneObject loaded = load_object(objects[i], with_splats, look, notices);
+    if (loaded.name.empty()) loaded.name = fmt::format("object{}", i);
     for (const SceneObject& other : file.scene.objects) {
       if (!other.moves || other.name != loaded.name) continue;
       throw UserError(fmt::format(
           "renderer.objects.{}.name: must be unique, but another object is also named {}; rename one", i, loaded.name));
     }
-    for (Eigen::Vector3f& vertex : loaded.mesh.vertices) vertex *= static_cast<float>(object.scale);
     file.scene.objects.push_back(std::move(loaded));
   }
-  if (const auto* lambert = std::get_if<LambertOptions>(&options.lighting)) file.scene.lighting = lighting_of(*lambert);
+  if (const auto* lambert = std::get_if<LambertOptions>(&lighting)) file.scene.lighting = lighting_of(*lambert);
+}
+
+SceneFile load(const MeshRendererOptions& options, SceneLook look, const Notices& notices) {
+  require_scene_path(options.scene, "scene");
+  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning, look);
+  notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
+  add_objects(options.objects, options.lighting, nullptr, look, notices, file);
+  return file;
+}
+
+SceneFile load(const SplatsRendererOptions& options, SceneLook look, const Notices& notices) {
+  require_scene_path(options.scene, "scene");
+  SceneFile file;
+  if (is_splat_file(options.scene)) {
+    file.scene.objects.push_back({"", {}, false, splats_of(options.scene, options.scale, options, notices)});
+  } else {
+    file = load_scene_file(readable(options.scene, notices), notices.warning, look);
+    notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
+  }
+  add_objects(options.objects, options.lighting, &options, look, notices, file);
   return file;
 }
 

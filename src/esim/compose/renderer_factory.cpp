@@ -9,6 +9,7 @@
 #include "esim/backends/plane/plane_renderer.h"
 #include "esim/backends/raycast/raster/raster_renderer.h"
 #include "esim/backends/raycast/raycast_renderer.h"
+#include "esim/backends/splats/splat_renderer.h"
 #include "esim/backends/sprites/sprites_renderer.h"
 #include "esim/backends/unrealcv/unrealcv_renderer.h"
 #include "esim/compose/compose.h"
@@ -57,6 +58,16 @@ bool prefers_gl(bool colour) {
   return std::any_of(devices.begin(), devices.end(), [](const GlDevice& device) { return !device.software; });
 }
 
+/// Throws UserError unless all splats are blended in the same space.
+void require_same_light(const std::vector<SplatObject>& objects) {
+  for (const SplatObject& object : objects) {
+    if (object.splats->light == objects.front().splats->light) continue;
+    throw UserError(
+        "renderer.light: is missing, but some of the splats are in linear light and others in display colours; set it "
+        "to linear or display");
+  }
+}
+
 /// The engine on the processor that suits the scene. Rays are faster if there are many triangles in each pixel, or if
 /// one ray per pixel is enough (bench_renderers).
 MeshEngine choose_for_processor(const MeshRendererOptions& options, const Scene& scene) {
@@ -90,6 +101,46 @@ RendererFactory factory(const MeshRendererOptions& options, const SceneFile& fil
   return with_area([=](const Camera& camera, ColourFilters filters, const PixelArea& area, const Workers& workers) {
     return make_raycast_renderer(scene, raycast, camera, workers, filters, area);
   });
+}
+
+RendererFactory factory(const SplatsRendererOptions& options, const SceneFile& file, bool colour) {
+  std::vector<SplatObject> objects;
+  SceneFile meshes;
+  meshes.scene.lighting = file.scene.lighting;
+  std::vector<std::size_t> moving_meshes;
+  std::size_t moving = 0;
+  for (const SceneObject& object : file.scene.objects) {
+    const std::optional<std::size_t> number = object.moves ? std::optional(moving++) : std::nullopt;
+    if (object.splats != nullptr) {
+      objects.push_back({object.splats, number});
+    } else {
+      meshes.scene.objects.push_back(object);
+      if (number) moving_meshes.push_back(*number);
+    }
+  }
+  require_same_light(objects);
+  MeshRendererOptions mesh;
+  mesh.background = options.background;
+  std::optional<RendererFactory> make_surfaces;
+  if (!meshes.scene.objects.empty()) make_surfaces = factory(mesh, meshes, colour);
+
+  SplatOptions splats;
+  splats.projection = options.projection;
+  splats.order = options.order;
+  splats.display_gamma = options.display_gamma;
+  splats.background = static_cast<float>(options.background);
+  splats.gain = static_cast<float>(options.gain);
+  const auto scene = build_splat_scene(objects);
+  return with_area(
+      without_edges([=](const Camera& camera, ColourFilters filters, double footprint, const Workers& workers) {
+        SplatSurfaces surfaces;
+        if (make_surfaces) {
+          surfaces.renderer = footprint == 1 ? make_surfaces->make(camera, filters, workers)
+                                             : make_surfaces->make_with_area(camera, {footprint, footprint}, workers);
+          surfaces.objects = moving_meshes;
+        }
+        return make_splat_renderer(scene, splats, camera, workers, filters, footprint, std::move(surfaces));
+      }));
 }
 
 RendererFactory factory(const PanoramaRendererOptions& options, const SceneFile&, bool colour) {

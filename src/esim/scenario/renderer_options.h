@@ -11,6 +11,7 @@
 #include "esim/scenario/pose_options.h"
 #include "esim/scenario/trajectory_options.h"
 #include "esim/scene/engine_images.h"
+#include "esim/scene/splats/splats.h"
 #include "esim/scene/sprite.h"
 
 /// What the cameras see. A new renderer is a struct with its describe(), an alternative of the variant at the end, and
@@ -126,6 +127,52 @@ void describe(Visitor& visit, MeshRendererOptions& o) {
           "of raster). 1 is faster: pixels see only their centres, so that edges move in steps",
           "", 1, 64});
   visit("background", o.background, About{"irradiance of pixels that see no surface", "", 0, 1e6});
+}
+
+/// Gaussian splats, and meshes among them.
+struct SplatsRendererOptions {
+  static constexpr const char* kType = "splats";
+  std::filesystem::path scene;
+  double scale = 1.0;
+  std::optional<Eigen::Vector3d> up;
+  std::vector<ObjectOptions> objects;
+  std::optional<SplatLight> light;
+  double display_gamma = 0;
+  double gain = 1.0;
+  std::optional<SplatFilter> filter;
+  SplatProjection projection = SplatProjection::automatic;
+  SplatOrder order = SplatOrder::ray;
+  LightingOptions lighting;
+  double background = 0.0;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, SplatsRendererOptions& o) {
+  visit("scene", o.scene,
+        About{"file of splats: PLY (also compressed), .splat, .spz, .sog, glTF with KHR_gaussian_splatting; or a mesh, "
+              "among whose objects are splats"});
+  visit("scale", o.scale, About{"factor that converts the scene file's coordinates to metres", "", 0, 1e6, true});
+  visit("up", o.up, About{"direction in the scene file that becomes the world's z axis (default: z)"});
+  visit("objects", o.objects, About{"objects that move through the scene, splats or meshes: a list of maps of"});
+  visit("light", o.light,
+        About{"space in which colours are blended. display: sRGB, as in models trained on photographs; linear: linear "
+              "light (default: as the file says, otherwise display)"});
+  visit("display_gamma", o.display_gamma,
+        About{"exponent from display colours to linear light; 0: the sRGB curve", "", 0, 10});
+  visit("gain", o.gain, About{"factor from linear light to irradiance", "", 0, 1e6, true});
+  visit("filter", o.filter,
+        About{"how splats were widened in training. dilated: by 0.3 px² with unchanged opacity; antialiased: by 0.3 "
+              "px², their opacity falls; mip: by 0.1 px², their opacity falls (default: as the file says, otherwise "
+              "dilated)"});
+  visit("projection", o.projection,
+        About{"linear: by the pinhole's Jacobian at the centre of each splat; unscented: seven points of each splat, "
+              "exactly through the lens; auto: linear without distortion, unscented otherwise"});
+  visit("order", o.order,
+        About{"order in which splats are blended. ray: by depth along the ray of each pixel; distance: by the distance "
+              "of their centres, as in the original 3D Gaussian splatting, where changes of the order fire false "
+              "events"});
+  visit("lighting", o.lighting, About{"of meshes; unlit: a surface is as bright as its texture"});
+  visit("background", o.background, About{"irradiance behind everything", "", 0, 1e6});
 }
 
 /// The filters of an image (scene/images/image_file.h, Softening).
@@ -326,8 +373,22 @@ void describe(Visitor& visit, BlenderRendererOptions& o) {
         About{"maximum wait for Blender to open the scene, and for each image", "s", 0, 86400, true});
 }
 
-using RendererOptions = std::variant<MeshRendererOptions, PanoramaRendererOptions, PlaneRendererOptions,
-                                     SpritesRendererOptions, UnrealcvRendererOptions, BlenderRendererOptions>;
+using RendererOptions =
+    std::variant<MeshRendererOptions, SplatsRendererOptions, PanoramaRendererOptions, PlaneRendererOptions,
+                 SpritesRendererOptions, UnrealcvRendererOptions, BlenderRendererOptions>;
+
+/// The objects that a scenario adds to the scene file of its renderer; null if it can have none.
+inline const std::vector<ObjectOptions>* listed_objects(const RendererOptions& renderer) {
+  return std::visit(
+      [](const auto& options) -> const std::vector<ObjectOptions>* {
+        if constexpr (requires(const std::vector<ObjectOptions>* objects) { objects = &options.objects; }) {
+          return &options.objects;
+        } else {
+          return nullptr;
+        }
+      },
+      renderer);
+}
 
 /// The moving objects in the scene of another program that renders; null if esim renders. Renderers of other programs
 /// are those with a list of EngineObjectOptions.
@@ -355,6 +416,14 @@ template <>
 inline constexpr std::array<const char*, 2> kEnumNames<SpriteInterpolation>{"spline", "linear"};
 template <>
 inline constexpr std::array<const char*, 5> kEnumNames<MeshEngine>{"processor", "raycast", "raster", "gl", "auto"};
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<SplatLight>{"display", "linear"};
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<SplatFilter>{"dilated", "antialiased", "mip"};
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<SplatProjection>{"auto", "linear", "unscented"};
+template <>
+inline constexpr std::array<const char*, 2> kEnumNames<SplatOrder>{"ray", "distance"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<BlenderEngine>{"cycles", "eevee"};
 template <>

@@ -1,11 +1,13 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "esim/scene/lighting.h"
 #include "esim/scene/mesh.h"
+#include "esim/scene/splats/splats.h"
 
 namespace esim::inline scene {
 
@@ -14,6 +16,9 @@ struct SceneObject {
   std::string name;
   Mesh mesh;           ///< in the object's frame, which is the world frame if it does not move
   bool moves = false;  ///< each request contains its pose (see RenderRequest::objects)
+
+  /// If set, the object consists of these instead of the mesh, which is empty.
+  std::shared_ptr<const Splats> splats{};
 };
 
 /// A scene for renderers of triangles.

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 namespace esim::inline scene {
@@ -20,6 +22,19 @@ enum class SplatLight {
   linear,   ///< linear light
 };
 
+/// How splats are projected to the image.
+enum class SplatProjection {
+  automatic,   ///< linear without distortion, otherwise unscented
+  linear,      ///< by the Jacobian of the pinhole at the splat's centre (EWA), as the original 3D Gaussian splatting
+  unscented,   ///< by seven points of the splat, which are projected exactly through the lens, as in 3DGUT
+};
+
+/// The order in which splats are composited.
+enum class SplatOrder {
+  ray,       ///< in each pixel, by the depth at which they contribute most to its ray
+  distance,  ///< everywhere by the distance of their centres
+};
+
 /// A scene of three-dimensional Gaussians. All arrays have an entry per splat.
 struct Splats {
   std::vector<Eigen::Vector3f> positions;   ///< of their centres, m
@@ -35,11 +50,20 @@ struct Splats {
   /// to the splat, is max(0, 0.5 + Σ_k harmonics_k Y_k(d)).
   std::vector<float> harmonics;
 
+  /// From the coordinates of all this to those of the object or the world.
+  Eigen::Quaterniond to_object = Eigen::Quaterniond::Identity();
+
   SplatFilter filter = SplatFilter::dilated;  ///< as the file says
   SplatLight light = SplatLight::display;     ///< as the file says
 
   std::size_t size() const { return positions.size(); }
   std::size_t coefficients() const { return static_cast<std::size_t>((degree + 1) * (degree + 1)); }
 };
+
+/// The box around the centres, in the object's coordinates.
+Eigen::AlignedBox3d bounds(const Splats& splats);
+
+/// A summary in one line: number, degree, light, filter, and size.
+std::string summary(const Splats& splats);
 
 }  // namespace esim::inline scene

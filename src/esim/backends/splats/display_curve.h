@@ -1,0 +1,52 @@
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <vector>
+
+#include "esim/scene/planes.h"
+#include "esim/scene/splats/splats.h"
+
+// Private to backends/splats.
+namespace esim::inline backends::inline splats {
+
+/// From the space in which splats are composited to linear light. For SplatLight::display this is a power of `gamma`, or
+/// the sRGB curve (IEC 61966-2-1) if gamma is 0; both continue above white. Between entries of the table the curve is
+/// linear, within 3e-6 of its value.
+class DisplayCurve {
+ public:
+  DisplayCurve(SplatLight light, double gamma) : gamma_(static_cast<float>(gamma)) {
+    if (light == SplatLight::linear) return;
+    for (std::size_t i = 0; i <= kEntries; ++i)
+      table_.push_back(exact(static_cast<float>(i) / static_cast<float>(kEntries)));
+  }
+
+  float linear(float encoded) const {
+    if (table_.empty() || encoded <= 0) return std::max(encoded, 0.0F);
+    const float place = encoded * static_cast<float>(kEntries);
+    const auto i = static_cast<std::size_t>(place);
+    if (i >= kEntries) return exact(encoded);
+    return table_[i] + (place - static_cast<float>(i)) * (table_[i + 1] - table_[i]);
+  }
+
+  /// The inverse of linear().
+  float encoded(float linear) const {
+    if (table_.empty() || linear <= 0) return std::max(linear, 0.0F);
+    if (gamma_ > 0) return std::pow(linear, 1 / gamma_);
+    return linear <= 0.0031308F ? 12.92F * linear : 1.055F * std::pow(linear, 1 / 2.4F) - 0.055F;
+  }
+
+ private:
+  static constexpr std::size_t kEntries = 4096;
+
+  float exact(float encoded) const {
+    if (gamma_ > 0) return std::pow(encoded, gamma_);
+    return encoded <= 0.04045F ? encoded / 12.92F : std::pow((encoded + 0.055F) / 1.055F, 2.4F);
+  }
+
+  float gamma_;
+  std::vector<float> table_;
+};
+
+}  // namespace esim::inline backends::inline splats

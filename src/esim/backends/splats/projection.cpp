@@ -1,0 +1,342 @@
+#include "esim/backends/splats/projection.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <numbers>
+
+#include "esim/backends/splats/harmonics.h"
+#include "esim/backends/splats/lens_lanes.h"
+#include "esim/geometry/distortion.h"
+#include "esim/render/pixel_rays.h"
+
+namespace esim::inline backends::inline splats {
+namespace {
+
+constexpr float kHuge = 32000;  // px; limit of rectangles
+
+/// Radius of the disc of ideal points that the lens can show.
+float domain_of(const Camera& camera) {
+  constexpr double kMost = 1e3;
+  const auto valid = [&](double radius) {
+    return std::visit([&](const auto& lens) { return distort(lens, {radius, 0.0}).has_value(); }, camera.distortion);
+  };
+  double inside = 0, outside = kMost;
+  if (valid(kMost)) return static_cast<float>(kMost);
+  for (int i = 0; i < 60; ++i) {
+    const double middle = (inside + outside) / 2;
+    (valid(middle) ? inside : outside) = middle;
+  }
+  return static_cast<float>(inside);
+}
+
+float variance_of(SplatFilter filter) { return filter == SplatFilter::mip ? 0.1F : 0.3F; }
+
+using LaneVector = std::array<Lanes, 3>;
+
+HWY_INLINE Lanes dot(const LaneVector& a, const LaneVector& b) {
+  return hn::MulAdd(a[0], b[0], hn::MulAdd(a[1], b[1], hn::Mul(a[2], b[2])));
+}
+
+HWY_INLINE LaneVector turned(const Eigen::Matrix3f& R, const LaneVector& v) {
+  const auto row = [&](int r) {
+    return hn::MulAdd(all(R(r, 0)), v[0], hn::MulAdd(all(R(r, 1)), v[1], hn::Mul(all(R(r, 2)), v[2])));
+  };
+  return {row(0), row(1), row(2)};
+}
+
+/// The shape of splats in the image: their centres, and columns t_i of a root of their covariances, Σ_i t_i t_i^T.
+template <std::size_t kColumns>
+struct ImageShape {
+  LanePoints centre;
+  std::array<LanePoints, kColumns> columns;
+};
+
+/// d(pixel)/d(bearing) of the lens at a point; px.
+struct LaneJacobian {
+  Lanes ux, uy, vx, vy;
+};
+
+/// A pinhole, and splats projected by its Jacobian.
+struct LinearLens {
+  Lanes fx, fy, cx, cy;
+  Lanes limit_x, limit_y;
+
+  HWY_INLINE ImageShape<3> shape(const LaneVector& mean, const std::array<LaneVector, 3>& axes, Lanes inverse) const {
+    const Lanes x = hn::Mul(mean[0], inverse), y = hn::Mul(mean[1], inverse);
+    const Lanes jx = hn::Max(hn::Min(x, limit_x), hn::Neg(limit_x)), jy = hn::Max(hn::Min(y, limit_y), hn::Neg(limit_y));
+    ImageShape<3> shape;
+    shape.centre = {hn::MulAdd(fx, x, cx), hn::MulAdd(fy, y, cy)};
+    for (std::size_t i = 0; i < 3; ++i) {
+      shape.columns[i] = {hn::Mul(hn::Mul(fx, inverse), hn::NegMulAdd(jx, axes[i][2], axes[i][0])),
+                          hn::Mul(hn::Mul(fy, inverse), hn::NegMulAdd(jy, axes[i][2], axes[i][1]))};
+    }
+    return shape;
+  }
+
+  HWY_INLINE LaneJacobian jacobian(const LaneVector&, Lanes) const { return {fx, hn::Zero(kTag), hn::Zero(kTag), fy}; }
+};
+
+/// The unscented transform of Wu et al., 3DGUT, 2025, with alpha = 1, beta = 2, kappa = 0: six points at sqrt(3)
+/// standard deviations have the mean's weight 1/6 each, and the centre has the weight 2 in the covariance.
+template <class Model>
+struct UnscentedLens {
+  const Model& model;
+  Lanes fx, fy, cx, cy;
+  float domain;
+
+  HWY_INLINE LanePoints pixel(const LaneVector& point) const {
+    const Lanes inverse = hn::Div(all(1), hn::Max(point[2], all(kNearest)));
+    return pixel(LanePoints{hn::Mul(point[0], inverse), hn::Mul(point[1], inverse)});
+  }
+
+  HWY_INLINE LanePoints pixel(LanePoints bearing) const {
+    const LanePoints image = distorted(model, inside(bearing, domain));
+    return {hn::MulAdd(fx, image.x, cx), hn::MulAdd(fy, image.y, cy)};
+  }
+
+  HWY_INLINE ImageShape<7> shape(const LaneVector& mean, const std::array<LaneVector, 3>& axes, Lanes) const {
+    const Lanes third = all(1.0F / 3), side = all(std::numbers::sqrt3_v<float>);
+    const Lanes root = all(1 / std::numbers::sqrt3_v<float>), two = all(std::numbers::sqrt2_v<float>);
+    const LanePoints centre = pixel(mean);
+    ImageShape<7> shape;
+    // Of each pair of points: half of their difference, and how far their middle is from the centre
+    std::array<LanePoints, 3> middle;
+    LanePoints shift{hn::Zero(kTag), hn::Zero(kTag)};
+    for (std::size_t i = 0; i < 3; ++i) {
+      LaneVector ahead, behind;
+      for (std::size_t k = 0; k < 3; ++k) {
+        ahead[k] = hn::MulAdd(side, axes[i][k], mean[k]);
+        behind[k] = hn::NegMulAdd(side, axes[i][k], mean[k]);
+      }
+      const LanePoints a = pixel(ahead), b = pixel(behind);
+      const auto half = [](Lanes x) { return hn::Mul(all(0.5F), x); };
+      shape.columns[i] = {hn::Mul(root, half(hn::Sub(a.x, b.x))), hn::Mul(root, half(hn::Sub(a.y, b.y)))};
+      middle[i] = {hn::Sub(half(hn::Add(a.x, b.x)), centre.x), hn::Sub(half(hn::Add(a.y, b.y)), centre.y)};
+      shift = {hn::MulAdd(third, middle[i].x, shift.x), hn::MulAdd(third, middle[i].y, shift.y)};
+    }
+    for (std::size_t i = 0; i < 3; ++i) {
+      shape.columns[3 + i] = {hn::Mul(root, hn::Sub(middle[i].x, shift.x)),
+                              hn::Mul(root, hn::Sub(middle[i].y, shift.y))};
+    }
+    shape.columns[6] = {hn::Mul(two, shift.x), hn::Mul(two, shift.y)};
+    shape.centre = {hn::Add(centre.x, shift.x), hn::Add(centre.y, shift.y)};
+    return shape;
+  }
+
+  HWY_INLINE LaneJacobian jacobian(const LaneVector& mean, Lanes inverse) const {
+    constexpr float kStep = 1e-2F;
+    const Lanes x = hn::Mul(mean[0], inverse), y = hn::Mul(mean[1], inverse), step = all(kStep);
+    const Lanes scale = all(0.5F / kStep);
+    const LanePoints right = pixel(LanePoints{hn::Add(x, step), y}), left = pixel(LanePoints{hn::Sub(x, step), y});
+    const LanePoints down = pixel(LanePoints{x, hn::Add(y, step)}), up = pixel(LanePoints{x, hn::Sub(y, step)});
+    return {hn::Mul(scale, hn::Sub(right.x, left.x)), hn::Mul(scale, hn::Sub(down.x, up.x)),
+            hn::Mul(scale, hn::Sub(right.y, left.y)), hn::Mul(scale, hn::Sub(down.y, up.y))};
+  }
+};
+
+struct LaneRect {
+  Lanes left, right, top, bottom;
+};
+
+/// Stores rectangles; those of splats that are not `visible`, or whose numbers are not finite, are empty.
+HWY_INLINE void keep(const LaneRect& rect, hn::Mask<LanesTag> visible, std::size_t first, ProjectedCluster& projected) {
+  const Lanes high = all(kHuge), low = all(-kHuge);
+  const auto ordered = hn::And(hn::Ge(hn::Sub(rect.right, rect.left), hn::Zero(kTag)),
+                               hn::Ge(hn::Sub(rect.bottom, rect.top), hn::Zero(kTag)));
+  const auto kept = hn::And(visible, ordered);
+  const hn::RebindToSigned<LanesTag> wide;
+  const hn::Rebind<std::int16_t, LanesTag> narrow;
+  const auto store = [&](Lanes value, Lanes otherwise, std::int16_t* to) {
+    const Lanes limited = hn::Max(hn::Min(hn::IfThenElse(kept, value, otherwise), high), low);
+    hn::StoreU(hn::DemoteTo(narrow, hn::ConvertTo(wide, limited)), narrow, to + first);
+  };
+  store(rect.left, high, projected.left.data()), store(rect.right, low, projected.right.data());
+  store(rect.top, high, projected.top.data()), store(rect.bottom, low, projected.bottom.data());
+}
+
+/// Stores splats side by side; their fields are in the order of ScreenSplat.
+HWY_INLINE void keep(const std::array<Lanes, 16>& fields, ScreenSplat* splats) {
+  alignas(64) std::array<std::array<float, kLanes>, 16> rows;
+  for (std::size_t field = 0; field < fields.size(); ++field) hn::Store(fields[field], kTag, rows[field].data());
+  for (std::size_t lane = 0; lane < static_cast<std::size_t>(kLanes); ++lane) {
+    std::array<float, 16> of_lane;
+    for (std::size_t field = 0; field < fields.size(); ++field) of_lane[field] = rows[field][lane];
+    splats[lane] = std::bit_cast<ScreenSplat>(of_lane);
+  }
+}
+
+}  // namespace
+
+SplatView::SplatView(const RenderRequest& request, std::size_t object, const Eigen::Quaterniond& to_object) {
+  SE3 T_group_camera = request.camera.T_world_body;
+  if (object > 0) T_group_camera = request.objects[object - 1].T_world_body.inverse() * T_group_camera;
+  T_group_camera = SE3{to_object.conjugate(), Eigen::Vector3d::Zero()} * T_group_camera;
+  R_camera_group = T_group_camera.rotation.toRotationMatrix().transpose().cast<float>();
+  position = T_group_camera.translation.cast<float>();
+  position_remainder = (T_group_camera.translation - position.cast<double>()).cast<float>();
+}
+
+Projector::Projector(const Camera& camera, SplatProjection projection, float footprint)
+    : camera_(camera),
+      linear_(projection == SplatProjection::linear ||
+              (projection == SplatProjection::automatic && std::holds_alternative<NoDistortion>(camera.distortion))),
+      area_(footprint * footprint),
+      domain_(domain_of(camera)) {
+  const PixelRays rays(camera);
+  float largest = 0, smallest = std::numeric_limits<float>::infinity();
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 0; x < camera.width; ++x) {
+      Eigen::Matrix2f J;
+      J << rays.dx_du(x, y), rays.dx_dv(x, y), rays.dy_du(x, y), rays.dy_dv(x, y);
+      const float norm = J.norm();
+      largest = std::max(largest, norm), smallest = std::min(smallest, std::abs(J.determinant()) / norm);
+      widest_ = std::max({widest_, std::abs(rays.x(x, y)), std::abs(rays.y(x, y))});
+      limit_x_ = std::max(limit_x_, std::abs(rays.x(x, y))), limit_y_ = std::max(limit_y_, std::abs(rays.y(x, y)));
+    }
+  }
+  limit_x_ *= 1.3F, limit_y_ *= 1.3F;  // as in the original 3D Gaussian splatting
+  bearing_per_px_ = largest;
+  stretch_ = linear_ ? 1 : 2 * largest / smallest;
+}
+
+BearingRect Projector::bounds(const SplatCluster& cluster, const SplatView& view) const {
+  constexpr float kInfinity = std::numeric_limits<float>::infinity();
+  BearingRect rect{kInfinity, -kInfinity, kInfinity, -kInfinity};
+  float nearest = kInfinity, farthest = -kInfinity;
+  for (int corner = 0; corner < 8; ++corner) {
+    const Eigen::Vector3f point(corner & 1 ? cluster.high.x() : cluster.low.x(),
+                                corner & 2 ? cluster.high.y() : cluster.low.y(),
+                                corner & 4 ? cluster.high.z() : cluster.low.z());
+    const Eigen::Vector3f p = view.R_camera_group * (point - view.position);
+    nearest = std::min(nearest, p.z()), farthest = std::max(farthest, p.z());
+    const float inverse = 1 / std::max(p.z(), kNearest);
+    rect.left = std::min(rect.left, p.x() * inverse), rect.right = std::max(rect.right, p.x() * inverse);
+    rect.top = std::min(rect.top, p.y() * inverse), rect.bottom = std::max(rect.bottom, p.y() * inverse);
+  }
+  if (farthest < kNearest) return {1, 0, 1, 0};
+  const float closest = nearest - (linear_ ? 0 : std::numbers::sqrt3_v<float> * cluster.deviation);
+  if (closest < kNearest) return {-kInfinity, kInfinity, -kInfinity, kInfinity};
+  // The Jacobian by a point is at most sqrt(1 + r²) / z per bearing; and the filter of the image.
+  const float r2 = 2 * 1.69F * widest_ * widest_;
+  const float deviation = stretch_ * cluster.deviation * std::sqrt(1 + r2) / closest;
+  const float margin = kReach * (deviation + bearing_per_px_ * std::sqrt(0.3F * area_)) + bearing_per_px_;
+  return {rect.left - margin, rect.right + margin, rect.top - margin, rect.bottom + margin};
+}
+
+template <class Lens>
+void Projector::project_through(const Lens& lens, const SplatGroup& group, const SplatCluster& cluster,
+                                const SplatView& view, float object, ProjectedCluster& projected) const {
+  constexpr float kLog2E = std::numbers::log2e_v<float>;
+  const Lanes variance = all(variance_of(group.filter) * area_), one = all(1), zero = hn::Zero(kTag);
+  const bool compensated = group.filter != SplatFilter::dilated;
+  for (std::size_t i = cluster.first; i < cluster.first + cluster.count; i += kLanes) {
+    const auto load = [&](const SplatGroup::Column& column) { return hn::LoadU(kTag, &column[i]); };
+    LaneVector from_camera;
+    for (int k = 0; k < 3; ++k) {
+      const auto c = static_cast<std::size_t>(k);
+      const Lanes rough = hn::Sub(load(group.centre[c]), all(view.position[k]));
+      from_camera[c] = hn::Sub(rough, all(view.position_remainder[k]));
+    }
+    const LaneVector mean = turned(view.R_camera_group, from_camera);
+    std::array<LaneVector, 3> axes;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      axes[axis] = turned(view.R_camera_group,
+                          {load(group.axes[axis][0]), load(group.axes[axis][1]), load(group.axes[axis][2])});
+    }
+
+    // Opacity; next to the camera, it falls to 0.
+    const Lanes z = hn::Max(mean[2], all(kNearest)), inverse = hn::Div(one, z);
+    Lanes opacity = load(group.opacity);
+    opacity = hn::Mul(opacity, hn::Max(zero, hn::Min(one, hn::MulSub(mean[2], all(1 / kNearest), one))));
+
+    // The Gaussian in the image
+    const auto shape = lens.shape(mean, axes, inverse);
+    Lanes xx = variance, xy = zero, yy = variance, own = zero, trace = zero;
+    for (std::size_t a = 0; a < shape.columns.size(); ++a) {
+      const auto& [tx, ty] = shape.columns[a];
+      xx = hn::MulAdd(tx, tx, xx), xy = hn::MulAdd(tx, ty, xy), yy = hn::MulAdd(ty, ty, yy);
+      trace = hn::MulAdd(tx, tx, hn::MulAdd(ty, ty, trace));
+      for (std::size_t b = 0; b < a; ++b) {
+        const Lanes cross = hn::MulSub(tx, shape.columns[b].y, hn::Mul(ty, shape.columns[b].x));
+        own = hn::MulAdd(cross, cross, own);  // Binet and Cauchy: exact where xx yy - xy² cancels
+      }
+    }
+    const Lanes determinant = hn::MulAdd(variance, hn::Add(variance, trace), own);
+    if (compensated) opacity = hn::Mul(opacity, hn::Sqrt(hn::Div(own, determinant)));
+    const Lanes scale = hn::Div(all(-0.5F * kLog2E), determinant);
+
+    // Order of depth: the plane through the centre whose normal is the inverse covariance times the centre. On the
+    // ray b, the splat contributes most at 1/Z = b^T A b / b^T A m, which is linear in b for flat splats.
+    Lanes along = zero;
+    LanePoints normal{zero, zero};
+    Lanes thickness = zero;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const Lanes part = hn::Mul(load(group.flatness[axis]), dot(axes[axis], mean));
+      along = hn::MulAdd(part, dot(axes[axis], mean), along);
+      normal = {hn::MulAdd(part, axes[axis][0], normal.x), hn::MulAdd(part, axes[axis][1], normal.y)};
+      thickness = hn::MulAdd(axes[axis][2], axes[axis][2], thickness);
+    }
+    const Lanes per_along = hn::Div(one, hn::Max(along, all(1e-30F)));
+    const LaneJacobian J = lens.jacobian(mean, inverse);
+    const Lanes area = hn::MulSub(J.ux, J.vy, hn::Mul(J.uy, J.vx));
+    const Lanes per_area = hn::Div(per_along, hn::IfThenElse(hn::Gt(hn::Abs(area), all(1e-12F)), area, all(1e-12F)));
+    const Lanes right = hn::Mul(per_area, hn::MulSub(normal.x, J.vy, hn::Mul(normal.y, J.vx)));
+    const Lanes down = hn::Mul(per_area, hn::MulSub(normal.y, J.ux, hn::Mul(normal.x, J.uy)));
+    const Lanes extent = hn::Mul(all(3), hn::Sqrt(thickness));
+    const Lanes farthest = hn::Div(one, hn::Add(z, extent));
+    const Lanes nearest = hn::Div(one, hn::Max(hn::Sub(z, extent), hn::Mul(all(0.05F), z)));
+
+    // Rectangle: up to the opacity at which splats are invisible
+    const auto visible = hn::And(hn::Gt(opacity, all(kInvisible)), hn::Gt(determinant, zero));
+    const Lanes peak = log2_of(hn::Max(opacity, all(kInvisible)));
+    const Lanes reach2 = hn::Mul(all(2 / kLog2E), hn::Sub(peak, all(std::log2(kInvisible))));
+    const Lanes half_width = hn::Sqrt(hn::Mul(reach2, xx)), half_height = hn::Sqrt(hn::Mul(reach2, yy));
+
+    const LaneVector colour = colours_of(group, i, from_camera);
+    const Lanes distance = hn::Sqrt(dot(mean, mean));
+    const LaneRect rect{hn::Ceil(hn::Sub(shape.centre.x, half_width)), hn::Floor(hn::Add(shape.centre.x, half_width)),
+                        hn::Ceil(hn::Sub(shape.centre.y, half_height)),
+                        hn::Floor(hn::Add(shape.centre.y, half_height))};
+    keep(rect, visible, i - cluster.first, projected);
+    const std::array<Lanes, 16> fields{shape.centre.x,
+                                       shape.centre.y,
+                                       hn::Mul(scale, yy),
+                                       hn::Mul(all(-2), hn::Mul(scale, xy)),
+                                       hn::Mul(scale, xx),
+                                       peak,
+                                       inverse,
+                                       right,
+                                       down,
+                                       farthest,
+                                       nearest,
+                                       colour[0],
+                                       colour[1],
+                                       colour[2],
+                                       all(object),
+                                       distance};
+    keep(fields, &projected.splats[i - cluster.first]);
+  }
+  projected.set_bounds(cluster.count);
+}
+
+void Projector::project(const SplatGroup& group, const SplatCluster& cluster, const SplatView& view, float object,
+                        ProjectedCluster& projected) const {
+  const Lanes fx = all(static_cast<float>(camera_.fx)), fy = all(static_cast<float>(camera_.fy));
+  const Lanes cx = all(static_cast<float>(camera_.cx)), cy = all(static_cast<float>(camera_.cy));
+  if (linear_) {
+    return project_through(LinearLens{fx, fy, cx, cy, all(limit_x_), all(limit_y_)}, group, cluster, view, object,
+                           projected);
+  }
+  std::visit(
+      [&]<class Model>(const Model& model) {
+        project_through(UnscentedLens<Model>{model, fx, fy, cx, cy, domain_}, group, cluster, view, object,
+                        projected);
+      },
+      camera_.distortion);
+}
+
+}  // namespace esim::inline backends::inline splats

@@ -1,0 +1,60 @@
+#pragma once
+
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "esim/core/colour/colour.h"
+#include "esim/core/parallel.h"
+#include "esim/geometry/camera.h"
+#include "esim/render/renderer.h"
+#include "esim/scene/splats/splats.h"
+
+namespace esim::inline backends::inline splats {
+
+struct SplatOptions {
+  SplatProjection projection = SplatProjection::automatic;
+  SplatOrder order = SplatOrder::ray;
+  double display_gamma = 0;  ///< exponent from display colours to linear light; 0: the sRGB curve
+  float background = 0;      ///< irradiance behind all splats
+  float gain = 1;            ///< factor from linear light to irradiance
+};
+
+/// Splats that move together: all that is static, or an object with its own motion.
+struct SplatObject {
+  std::shared_ptr<const Splats> splats;  ///< in the object's frame, which is the world frame if it does not move
+  std::optional<std::size_t> moving{};   ///< which of RenderRequest::objects it is, if it moves
+};
+
+/// A renderer of surfaces among the splats.
+struct SplatSurfaces {
+  std::unique_ptr<Renderer> renderer{};
+  std::vector<std::size_t> objects{};  ///< which of RenderRequest::objects its moving objects are
+};
+
+/// A scene of splats, prepared for the renderers of several cameras.
+class SplatScene;
+
+/// All objects must have the same SplatLight.
+std::shared_ptr<const SplatScene> build_splat_scene(const std::vector<SplatObject>& objects);
+
+/// Renders Gaussian splats on the processor. A pixel's colour is composited from front to back as in Kerbl et al., 3D
+/// Gaussian Splatting for Real-Time Radiance Field Rendering, 2023, eq. (3), in the space of the splats' colours, and
+/// then converted to linear light and to luminance, or to the colour that the pixel sees through its filter. Where
+/// that has steps in time, this renderer does not: splats fade out between opacities of 1.5/255 and 0.5/255, and next
+/// to the camera; with SplatOrder::ray, order changes only where two splats meet on a ray.
+///
+/// Z is the depth at which half of the light is blocked, on the plane or ellipsoid of the splat where this happens; it
+/// is infinite where less is blocked. V and objects are those of this splat.
+///
+/// The square over which a pixel averages is represented by SplatFilter: its variance is that of the sensor's pixel,
+/// also in denser images, where `footprint` is above 1.
+///
+/// Surfaces hide the splats behind them. Their edges are blended in the space of the splats' colours.
+std::unique_ptr<Renderer> make_splat_renderer(std::shared_ptr<const SplatScene> scene, const SplatOptions& options,
+                                              const Camera& camera, const Workers& workers,
+                                              ColourFilters filters = ColourFilters::none, double footprint = 1,
+                                              SplatSurfaces surfaces = {});
+
+}  // namespace esim::inline backends::inline splats

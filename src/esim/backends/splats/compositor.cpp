@@ -65,8 +65,11 @@ Compositor::Pixel Compositor::pixel(int column, int row) const {
 /// Nearer splats have larger keys.
 float Compositor::key_of(const ScreenSplat& splat) const {
   if (order_ == SplatOrder::distance) return -splat.distance;
-  constexpr float kMiddle = (Bin::kSide - 1) / 2.0F;
-  const float dx = static_cast<float>(left_) + kMiddle - splat.x, dy = static_cast<float>(top_) + kMiddle - splat.y;
+  // In the bin's place that is nearest to the centre: beyond the splat, its depth means nothing.
+  const auto within = [](float at, int first) {
+    return std::clamp(at, static_cast<float>(first), static_cast<float>(first + Bin::kSide - 1));
+  };
+  const float dx = within(splat.x, left_) - splat.x, dy = within(splat.y, top_) - splat.y;
   return std::clamp(splat.nearness + splat.right * dx + splat.down * dy, splat.farthest, splat.nearest);
 }
 

@@ -55,11 +55,6 @@ struct ImageShape {
   std::array<LanePoints, kColumns> columns;
 };
 
-/// d(pixel)/d(bearing) of the lens at a point; px.
-struct LaneJacobian {
-  Lanes ux, uy, vx, vy;
-};
-
 /// A pinhole, and splats projected by its Jacobian.
 struct LinearLens {
   Lanes fx, fy, cx, cy;
@@ -76,8 +71,6 @@ struct LinearLens {
     }
     return shape;
   }
-
-  HWY_INLINE LaneJacobian jacobian(const LaneVector&, Lanes) const { return {fx, hn::Zero(kTag), hn::Zero(kTag), fy}; }
 };
 
 /// The unscented transform of Wu et al., 3DGUT, 2025, with alpha = 1, beta = 2, kappa = 0: six points at sqrt(3)
@@ -125,16 +118,6 @@ struct UnscentedLens {
     shape.columns[6] = {hn::Mul(two, shift.x), hn::Mul(two, shift.y)};
     shape.centre = {hn::Add(centre.x, shift.x), hn::Add(centre.y, shift.y)};
     return shape;
-  }
-
-  HWY_INLINE LaneJacobian jacobian(const LaneVector& mean, Lanes inverse) const {
-    constexpr float kStep = 1e-2F;
-    const Lanes x = hn::Mul(mean[0], inverse), y = hn::Mul(mean[1], inverse), step = all(kStep);
-    const Lanes scale = all(0.5F / kStep);
-    const LanePoints right = pixel(LanePoints{hn::Add(x, step), y}), left = pixel(LanePoints{hn::Sub(x, step), y});
-    const LanePoints down = pixel(LanePoints{x, hn::Add(y, step)}), up = pixel(LanePoints{x, hn::Sub(y, step)});
-    return {hn::Mul(scale, hn::Sub(right.x, left.x)), hn::Mul(scale, hn::Sub(down.x, up.x)),
-            hn::Mul(scale, hn::Sub(right.y, left.y)), hn::Mul(scale, hn::Sub(down.y, up.y))};
   }
 };
 
@@ -269,23 +252,16 @@ void Projector::project_through(const Lens& lens, const SplatGroup& group, const
     if (compensated) opacity = hn::Mul(opacity, hn::Sqrt(hn::Div(own, determinant)));
     const Lanes scale = hn::Div(all(-0.5F * kLog2E), determinant);
 
-    // Order of depth: the plane through the centre whose normal is the inverse covariance times the centre. On the
-    // ray b, the splat contributes most at 1/Z = b^T A b / b^T A m, which is linear in b for flat splats.
-    Lanes along = zero;
-    LanePoints normal{zero, zero};
-    Lanes thickness = zero;
+    // Depth, given the place in the image: the mean of the Gaussian there, with the filter's width, is linear. Its
+    // inverse is continued linearly, which is exact on planes.
+    Lanes zu = zero, zv = zero, thickness = zero;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const Lanes part = hn::Mul(load(group.flatness[axis]), dot(axes[axis], mean));
-      along = hn::MulAdd(part, dot(axes[axis], mean), along);
-      normal = {hn::MulAdd(part, axes[axis][0], normal.x), hn::MulAdd(part, axes[axis][1], normal.y)};
+      zu = hn::MulAdd(axes[axis][2], shape.columns[axis].x, zu), zv = hn::MulAdd(axes[axis][2], shape.columns[axis].y, zv);
       thickness = hn::MulAdd(axes[axis][2], axes[axis][2], thickness);
     }
-    const Lanes per_along = hn::Div(one, hn::Max(along, all(1e-30F)));
-    const LaneJacobian J = lens.jacobian(mean, inverse);
-    const Lanes area = hn::MulSub(J.ux, J.vy, hn::Mul(J.uy, J.vx));
-    const Lanes per_area = hn::Div(per_along, hn::IfThenElse(hn::Gt(hn::Abs(area), all(1e-12F)), area, all(1e-12F)));
-    const Lanes right = hn::Mul(per_area, hn::MulSub(normal.x, J.vy, hn::Mul(normal.y, J.vx)));
-    const Lanes down = hn::Mul(per_area, hn::MulSub(normal.y, J.ux, hn::Mul(normal.x, J.uy)));
+    const Lanes fall = hn::Neg(hn::Div(hn::Mul(inverse, inverse), determinant));
+    const Lanes right = hn::Mul(fall, hn::MulSub(zu, yy, hn::Mul(zv, xy)));
+    const Lanes down = hn::Mul(fall, hn::MulSub(zv, xx, hn::Mul(zu, xy)));
     const Lanes extent = hn::Mul(all(3), hn::Sqrt(thickness));
     const Lanes farthest = hn::Div(one, hn::Add(z, extent));
     const Lanes nearest = hn::Div(one, hn::Max(hn::Sub(z, extent), hn::Mul(all(0.05F), z)));

@@ -11,8 +11,7 @@ namespace esim::inline backends::inline splats {
 namespace {
 
 constexpr std::size_t kAlignment = 8;  // of clusters
-constexpr float kThinnest = 1e-3F;     // of a splat, relative to its largest axis; limits the condition of its inverse
-constexpr float kSmallest = 1e-7F;     // standard deviation, m
+constexpr float kSmallest = 1e-7F;     // standard deviation that is distinguished, m
 
 /// Spreads the lowest 20 bits of x to every third bit.
 std::uint64_t spread(std::uint64_t x) {
@@ -53,7 +52,6 @@ SplatGroup::SplatGroup(const Splats& splats) : degree(splats.degree), filter(spl
   const auto resize = [&](Column& column) { column.resize(size); };
   std::ranges::for_each(centre, resize);
   for (auto& axis : axes) std::ranges::for_each(axis, resize);
-  std::ranges::for_each(flatness, resize);
   std::ranges::for_each(colour, resize);
   resize(opacity);
   harmonics.resize((splats.coefficients() - 1) * 3 * size);
@@ -67,21 +65,16 @@ SplatGroup::SplatGroup(const Splats& splats) : degree(splats.degree), filter(spl
     for (std::size_t i = first; i < first + cluster.count; ++i) {
       const std::size_t from = order[std::min(i, first + count - 1)];
       const Eigen::Vector3f& p = splats.positions[from];
-      const Eigen::Vector3f wanted = splats.deviations[from].cwiseMax(kSmallest);
-      const float largest = wanted.maxCoeff();
-      const Eigen::Vector3f deviations = wanted.cwiseMax(largest * kThinnest);
-      const float thinnest = deviations.minCoeff();
+      const Eigen::Vector3f& deviations = splats.deviations[from];
       const Eigen::Vector4f& q = splats.rotations[from];
       const Eigen::Matrix3f R = Eigen::Quaternionf(q[3], q[0], q[1], q[2]).normalized().toRotationMatrix();
       cluster.low = cluster.low.cwiseMin(p), cluster.high = cluster.high.cwiseMax(p);
-      cluster.deviation = std::max(cluster.deviation, largest);
+      cluster.deviation = std::max(cluster.deviation, deviations.maxCoeff());
       opacity[i] = i < first + count ? splats.opacities[from] : 0;
       for (int k = 0; k < 3; ++k) {
         const auto c = static_cast<std::size_t>(k);
         centre[c][i] = p[k];
         for (int axis = 0; axis < 3; ++axis) axes[static_cast<std::size_t>(axis)][c][i] = R(k, axis) * deviations[axis];
-        const float ratio = thinnest / deviations[k];
-        flatness[c][i] = ratio * ratio / (deviations[k] * deviations[k]);
         colour[c][i] = 0.5F + 0.28209479177387814F * splats.harmonics[from * splats.coefficients() * 3 + c];
         for (std::size_t k1 = 1; k1 < splats.coefficients(); ++k1) {
           const float value = splats.harmonics[(from * splats.coefficients() + k1) * 3 + c];

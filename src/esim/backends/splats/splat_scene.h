@@ -30,7 +30,6 @@ struct SplatGroup {
   std::vector<SplatCluster> clusters;
   std::array<Column, 3> centre;               ///< m
   std::array<std::array<Column, 3>, 3> axes;  ///< axes[i][k]: component k of the standard deviation along axis i, m
-  std::array<Column, 3> flatness;             ///< of each axis: its share of the order of depth, see projection.cpp
   Column opacity;
   std::array<Column, 3> colour;  ///< the constant part: 0.5 + Y_0 harmonics_0
 

@@ -159,7 +159,7 @@ class SogReader {
   }
 
   void read_version() {
-    const Json& version = meta_.contains("version") ? meta_["version"] : Json(1);
+    const Json& version = meta_.contains("version") ? meta_["version"] : Json(1U);
     version_ = integer(version, "version");
     if (version_ != 1 && version_ != 2)
       fail(fmt::format("version of .sog must be 1 or 2, not {}; convert it to one of these", version_));

@@ -1,5 +1,5 @@
-// Reads arbitrary bytes from libFuzzer as a file of Gaussian splats, of the format that its content says, or .splat: the
-// result is splats or a UserError, in bounded memory and time.
+// Reads arbitrary bytes from libFuzzer as a file of Gaussian splats, of the format that its content says, or .splat:
+// the result is splats or a UserError, in bounded memory and time.
 #include <sys/mman.h>
 #include <unistd.h>
 

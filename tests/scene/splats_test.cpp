@@ -469,7 +469,12 @@ TEST(Splats, HugeCountsAreRefused) {
     auto files = test::sog_files(version, 0);
     files["meta.json"] = version == 1 ? with(files["meta.json"], "\"shape\":[2", "\"shape\":[200000")
                                       : with(files["meta.json"], "\"count\":2", "\"count\":200000");
-    EXPECT_TRUE(test::contains(refusal("a.sog", test::zip(files)), "must have at least 200000 pixels"));
+    EXPECT_TRUE(test::contains(refusal("a.sog", test::zip(files)), "cannot hold 200000 splats"));
+    files["meta.json"] = with(files["meta.json"], "200000", "20");
+    EXPECT_TRUE(test::contains(refusal("a.sog", test::zip(files)), "must have at least 20 pixels"));
+    files["sh0.webp"] = test::webp(2048, std::vector<std::array<int, 4>>(std::size_t{2048} * 1024));
+    files["meta.json"] = with(files["meta.json"], "20", "2");
+    EXPECT_TRUE(test::contains(refusal("a.sog", test::zip(files)), "image sh0.webp is damaged"));
   }
 
   GlbWriter glb = gltf(0);  // many copies of a splat

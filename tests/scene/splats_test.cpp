@@ -281,7 +281,7 @@ TEST(Splats, SogModel) {
 nlohmann::json gltf_primitive(GlbWriter& glb, int degree, const std::string& prefix = "KHR_gaussian_splatting:") {
   nlohmann::json attributes = {{"POSITION", glb.floats({1, 2, 3}, "VEC3")},
                                {prefix + "ROTATION", glb.floats({0, 0, 2, 2}, "VEC4")},
-                               {prefix + "SCALE", glb.floats({-1, -2, -3}, "VEC3")},
+                               {prefix + "SCALE", glb.floats({std::exp(-1.F), std::exp(-2.F), std::exp(-3.F)}, "VEC3")},
                                {prefix + "OPACITY", glb.floats({0.5F}, "SCALAR")}};
   for (int l = 0, k = 0; l <= degree; ++l) {
     for (int n = 0; n < 2 * l + 1; ++n, ++k) {
@@ -383,12 +383,27 @@ TEST(Splats, GltfOfOtherKinds) {
   EXPECT_TRUE(test::contains(refusal("a.glb", linear.bytes()), "SCALE"));
 
   // Bytes that are not normalised.
-  GlbWriter bytes = gltf(0);
-  const std::array<std::int8_t, 3> scales = {-1, -2, -3};
-  const std::size_t view = bytes.add_view(scales.data(), scales.size());
-  bytes.json["meshes"][0]["primitives"][0]["attributes"]["KHR_gaussian_splatting:SCALE"] =
-      bytes.add("accessors", {{"bufferView", view}, {"componentType", 5120}, {"count", 1}, {"type", "VEC3"}});
-  EXPECT_FLOAT_EQ(load("a.glb", bytes.bytes()).deviations[0].y(), std::exp(-2.F));
+  const auto with_scales = [](const std::array<std::int8_t, 3>& scales, int component) {
+    GlbWriter bytes = gltf(0);
+    const std::size_t view = bytes.add_view(scales.data(), scales.size());
+    bytes.json["meshes"][0]["primitives"][0]["attributes"]["KHR_gaussian_splatting:SCALE"] =
+        bytes.add("accessors", {{"bufferView", view}, {"componentType", component}, {"count", 1}, {"type", "VEC3"}});
+    return load("a.glb", bytes.bytes()).deviations[0];
+  };
+  EXPECT_EQ(with_scales({1, 2, 3}, 5121), Eigen::Vector3f(1, 2, 3));
+  EXPECT_FLOAT_EQ(with_scales({-1, -2, -3}, 5120).y(), std::exp(-2.F));  // logarithms, in a draft
+
+  // The first draft.
+  GlbWriter draft;
+  nlohmann::json first = gltf_primitive(draft, 0, "_");
+  first["attributes"].erase("_OPACITY");
+  first["attributes"].erase("_SH_DEGREE_0_COEF_0");
+  first["attributes"]["COLOR_0"] = draft.floats({1, 0, 0.25F, 0.75F}, "VEC4");
+  draft.add_node({{"mesh", draft.add("meshes", {{"primitives", {first}}})}});
+  const Splats splats = load("a.glb", draft.bytes());
+  EXPECT_FLOAT_EQ(splats.opacities[0], 0.75F);
+  EXPECT_FLOAT_EQ(0.5F + kC0 * harmonic(splats, 0, 0, 2), 0.25F);
+  EXPECT_FLOAT_EQ(splats.deviations[0].y(), std::exp(-2.F));
 }
 
 TEST(Splats, TrianglesAreForAnotherRenderer) {

@@ -1,4 +1,4 @@
-// glTF with the extension KHR_gaussian_splatting.
+// glTF with the extension KHR_gaussian_splatting, as in its release candidate of 2026, and as in earlier drafts.
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -135,16 +135,25 @@ class SplatGltfReader {
     check(*splat_extension(primitive));
     const Similarity to_scene = similarity(placed.T_scene_node);
     const auto positions = numbers(primitive, "POSITION", 3), rotations = numbers(primitive, "ROTATION", 4),
-               scales = numbers(primitive, "SCALE", 3), opacities = numbers(primitive, "OPACITY", 1);
-    const int degree = degree_of(primitive);
+               scales = numbers(primitive, "SCALE", 3);
+    std::vector<float> opacities;
     std::vector<std::vector<float>> harmonics;  // per coefficient
-    for (int l = 0; l <= degree; ++l) {
-      for (int n = 0; n < 2 * l + 1; ++n) harmonics.push_back(numbers(primitive, harmonic(l, n), 3));
+    if (attribute(primitive, "OPACITY") && attribute(primitive, harmonic(0, 0))) {
+      opacities = numbers(primitive, "OPACITY", 1);
+      for (int l = 0; l <= degree_of(primitive); ++l) {
+        for (int n = 0; n < 2 * l + 1; ++n) harmonics.push_back(numbers(primitive, harmonic(l, n), 3));
+      }
+    } else {
+      read_draft_colours(primitive, opacities, harmonics);
     }
     const std::size_t count = opacities.size();
     bool same = positions.size() == 3 * count && rotations.size() == 4 * count && scales.size() == 3 * count;
     for (const std::vector<float>& each : harmonics) same = same && each.size() == 3 * count;
     if (!same) document_.fail("is damaged: all attributes of splats must have the same count");
+
+    // Standard deviations. In the review draft of 2025, they were logarithms, most of which are negative.
+    const auto negative = std::count_if(scales.begin(), scales.end(), [](float scale) { return scale < 0; });
+    const bool logarithms = 2 * static_cast<std::size_t>(negative) > scales.size();
 
     // A splat looks the same if it is mirrored at its centre, so that a mirrored rotation may be negated.
     const double sign = to_scene.rotation.determinant() < 0 ? -1 : 1;
@@ -157,12 +166,29 @@ class SplatGltfReader {
       Splat splat;
       splat.position =
           (to_scene.scale * (to_scene.rotation * position.cast<double>()) + to_scene.translation).cast<float>();
-      splat.deviation = scale.array().exp() * static_cast<float>(to_scene.scale);
+      splat.deviation = scale;
+      if (logarithms) splat.deviation = scale.array().exp();
+      splat.deviation *= static_cast<float>(to_scene.scale);
       splat.rotation = (turn * Eigen::Quaternionf(rotation)).coeffs();
       splat.opacity = opacities[i];
       for (std::size_t k = 0; k < harmonics.size(); ++k) std::copy_n(&harmonics[k][3 * i], 3, &splat.harmonics[3 * k]);
       harmonic_turn.apply(splat, list.coefficients());
       list.add(splat);
+    }
+  }
+
+  /// Of the first drafts, in which COLOR_0 has the colour, which is the same in all directions, and the opacity.
+  void read_draft_colours(const Json& primitive, std::vector<float>& opacities,
+                          std::vector<std::vector<float>>& harmonics) const {
+    if (GltfDocument::find(attributes(primitive), "COLOR_0") == nullptr || attribute(primitive, "OPACITY"))
+      document_.fail(
+          fmt::format("is damaged: the attributes {0}:OPACITY and {0}:SH_DEGREE_0_COEF_0 must be given", kExtension));
+    const std::vector<float> colours =
+        document_.unchecked_floats(document_.index(attributes(primitive), "COLOR_0", "accessors"), 4);
+    std::vector<float>& first = harmonics.emplace_back();
+    for (std::size_t i = 0; i + 4 <= colours.size(); i += 4) {
+      for (std::size_t c = 0; c < 3; ++c) first.push_back(harmonic_of_colour(colours[i + c]));
+      opacities.push_back(colours[i + 3]);
     }
   }
 

@@ -6,11 +6,13 @@
 #include <memory>
 #include <nlohmann/json.hpp>
 #include <numbers>
+#include <optional>
 
 #include "esim/core/inputs/used_files.h"
 #include "esim/files/codecs/image_codecs.h"
 #include "esim/files/input_file.h"
 #include "esim/files/zip_reader.h"
+#include "esim/scene/images/image_header.h"
 #include "esim/scene/import/folder.h"
 #include "esim/scene/splats/splat_list.h"
 #include "esim/scene/splats/splat_readers.h"
@@ -159,7 +161,7 @@ class SogReader {
   }
 
   void read_version() {
-    const Json& version = meta_.contains("version") ? meta_["version"] : Json(1);
+    const Json& version = meta_.contains("version") ? meta_["version"] : Json(1U);
     version_ = integer(version, "version");
     if (version_ != 1 && version_ != 2)
       fail(fmt::format("version of .sog must be 1 or 2, not {}; convert it to one of these", version_));
@@ -171,32 +173,57 @@ class SogReader {
     }
   }
 
-  /// An image of a part, with at least `pixels` pixels.
-  SogImage image(const char* part, std::size_t index, std::uint64_t pixels) {
-    const Json& names = member(part, "files");
-    if (!names.is_array() || names.size() <= index || !names[index].is_string())
-      fail(fmt::format("meta.json: {}.files must have at least {} names", part, index + 1));
-    const auto name = names[index].get<std::string>();
-    const std::vector<std::byte> bytes = files_.read(name);
-    bytes_ += bytes.size();
-    SogImage image;
-    if (!decode_image(bytes, image.pixels) || image.pixels.channels < 3 || image.pixels.bits != 8)
-      fail(fmt::format("the image {} is damaged: it must be a lossless WebP; export it again", name));
-    if (image.width() * image.height() < pixels)
-      fail(fmt::format("the image {} must have at least {} pixels, one per splat, not {} x {}; export it again", name,
-                       pixels, image.width(), image.height()));
-    return image;
+  /// An image file: the name at the given place of a part's list.
+  struct Source {
+    const char* part = nullptr;
+    std::size_t index = 0;
+    SogImage SogReader::*image = nullptr;
+    std::uint64_t min_pixels = 0;
+    std::string name{};
+    std::vector<std::byte> bytes{};
+  };
+
+  void read_file(Source& source) {
+    const Json& names = member(source.part, "files");
+    if (!names.is_array() || names.size() <= source.index || !names[source.index].is_string())
+      fail(fmt::format("meta.json: {}.files must have at least {} names", source.part, source.index + 1));
+    source.name = names[source.index].get<std::string>();
+    source.bytes = files_.read(source.name);
+    bytes_ += source.bytes.size();
+  }
+
+  /// Decodes an image after checking its size, so that small files do not cause large allocations.
+  void decode(const Source& source) {
+    constexpr std::uint64_t kMaxPalette = 1 << 20;  // 65536 entries of 15 coefficients
+    const std::optional<ImageSize> size = size_in_header(source.bytes);
+    SogImage& image = this->*source.image;
+    const auto pixels = [](std::int64_t width, std::int64_t height) {
+      return static_cast<std::uint64_t>(width) * static_cast<std::uint64_t>(height);
+    };
+    const bool plausible = size && size->width > 0 && size->width < (1 << 24) && size->height > 0 &&
+                           size->height < (1 << 24) && pixels(size->width, size->height) <= 4 * count_ + kMaxPalette;
+    if (!plausible || !decode_image(source.bytes, image.pixels) || image.pixels.channels < 3 || image.pixels.bits != 8)
+      fail(fmt::format("the image {} is damaged: it must be a lossless WebP; export it again", source.name));
+    if (pixels(image.pixels.width, image.pixels.height) < source.min_pixels)
+      fail(fmt::format("the image {} must have at least {} pixels, one per splat, not {} x {}; export it again",
+                       source.name, source.min_pixels, image.width(), image.height()));
   }
 
   void read_images() {
-    low_ = image("means", 0, count_);
-    high_ = image("means", 1, count_);
-    rotations_ = image("quats", 0, count_);
-    deviations_ = image("scales", 0, count_);
-    colours_ = image("sh0", 0, count_);
-    if (!meta_.contains("shN") || meta_["shN"].is_null()) return;
-    palette_ = image("shN", 0, 0);
-    labels_ = image("shN", 1, count_);
+    std::vector<Source> sources = {{"means", 0, &SogReader::low_, count_},
+                                   {"means", 1, &SogReader::high_, count_},
+                                   {"quats", 0, &SogReader::rotations_, count_},
+                                   {"scales", 0, &SogReader::deviations_, count_},
+                                   {"sh0", 0, &SogReader::colours_, count_}};
+    const bool has_palette = meta_.contains("shN") && !meta_["shN"].is_null();
+    if (has_palette) {
+      sources.push_back({"shN", 0, &SogReader::palette_, 0});
+      sources.push_back({"shN", 1, &SogReader::labels_, count_});
+    }
+    for (Source& source : sources) read_file(source);
+    check_splat_count(file_, count_, bytes_);
+    for (const Source& source : sources) decode(source);
+    if (!has_palette) return;
     // A palette has 64 columns of one pixel per coefficient.
     for (int degree = 1; degree <= kMaxSplatDegree; ++degree) {
       if (palette_.width() == kPaletteColumns * static_cast<std::size_t>(degree * (degree + 2))) degree_ = degree;

@@ -14,13 +14,13 @@ namespace esim::inline scene {
 ///  - .splat: 32 bytes per splat;
 ///  - .spz, versions 1 to 4;
 ///  - .sog, versions 1 and 2, as a ZIP file, or its meta.json in a folder;
-///  - glTF (.glb, .gltf) with KHR_gaussian_splatting.
+///  - glTF (.glb, .gltf) with KHR_gaussian_splatting, also of its drafts.
 /// Positions are in the file's own axes, which usually are right, down, forward; those of .spz are converted to these.
 /// glTF is as in other scenes: z is up, and the transforms of nodes are applied, with their uniform scales.
 ///
-/// Splats with numbers that are not finite, with a rotation of zero, or with a standard deviation above 1e6 m are
-/// dropped, with a warning that counts them. Throws UserError, naming the file, if it cannot be read, is damaged or
-/// truncated, is of another kind, or has no splats.
+/// Splats with numbers that are not finite, with a rotation of zero, with a standard deviation that is negative or
+/// above 1e6 m, or with an opacity outside 0 to 1 are dropped, with a warning that counts them. Throws UserError,
+/// naming the file, if it cannot be read, is damaged or truncated, is of another kind, or has no splats.
 Splats load_splats(const std::filesystem::path& path, const WarningHandler& warn);
 
 /// Whether a file is one of these.

@@ -33,8 +33,7 @@ bool is_valid(const Splat& splat, std::size_t numbers, float norm) {
 
 SplatList::SplatList(std::filesystem::path file, int degree, std::uint64_t count, std::uint64_t file_bytes)
     : file_(std::move(file)) {
-  if (count > kSmall && (count - kSmall) / kMaxSplatsPerByte > file_bytes)
-    fail_splats(file_, fmt::format("is damaged: it cannot hold {} splats in {} bytes", count, file_bytes));
+  check_splat_count(file_, count, file_bytes);
   splats_.degree = degree;
   splats_.positions.reserve(count);
   splats_.deviations.reserve(count);
@@ -70,6 +69,11 @@ Splats SplatList::finish(const WarningHandler& warn) {
 }
 
 float sigmoid(float x) { return 1 / (1 + std::exp(-x)); }
+
+void check_splat_count(const std::filesystem::path& file, std::uint64_t count, std::uint64_t file_bytes) {
+  if (count > kSmall && (count - kSmall) / kMaxSplatsPerByte > file_bytes)
+    fail_splats(file, fmt::format("is damaged: it cannot hold {} splats in {} bytes", count, file_bytes));
+}
 
 void fail_splats(const std::filesystem::path& file, const std::string& reason) {
   throw UserError(fmt::format("splats {}: {}", file.string(), reason));

@@ -31,8 +31,7 @@ struct Splat {
 /// rotation of zero, a deviation that is negative or above 1e6 m, or an opacity outside 0 to 1.
 class SplatList {
  public:
-  /// Reserves memory for `count` splats. Throws UserError if a file of so many bytes cannot hold so many, so that
-  /// damaged files do not cause large allocations: no real file has more than 16 splats per byte.
+  /// Reserves memory for `count` splats, after check_splat_count().
   SplatList(std::filesystem::path file, int degree, std::uint64_t count, std::uint64_t file_bytes);
 
   std::size_t coefficients() const { return splats_.coefficients(); }
@@ -56,6 +55,10 @@ inline float harmonic_of_colour(float colour) { return (colour - 0.5F) / kHarmon
 
 /// 1 / (1 + exp(-x)); 0 and 1 at the infinities, which exporters write for them.
 float sigmoid(float x);
+
+/// Throws UserError if a file of so many bytes cannot hold so many splats, so that damaged files do not cause large
+/// allocations: no real file has more than 16 splats per byte.
+void check_splat_count(const std::filesystem::path& file, std::uint64_t count, std::uint64_t file_bytes);
 
 /// Throws the UserError "splats FILE: REASON".
 [[noreturn]] void fail_splats(const std::filesystem::path& file, const std::string& reason);

@@ -77,7 +77,7 @@ std::array<std::pair<std::vector<std::uint8_t> Streams::*, std::size_t>, 6> stre
 /// Decompresses gzip in pieces.
 class Gunzip {
  public:
-  Gunzip(const fs::path& path) : file_(path) {
+  explicit Gunzip(const fs::path& path) : file_(path) {
     if (inflateInit2(&stream_, 16 + MAX_WBITS) != Z_OK) throw std::bad_alloc();
   }
   ~Gunzip() { inflateEnd(&stream_); }
@@ -140,10 +140,10 @@ Splats read_gzip(const fs::path& path, const WarningHandler& warn) {
     if (data.read(stream) < stream.size())
       fail_splats(path, fmt::format("is cut off: it must have {} splats; copy or export it again", header.count));
   }
-  if ((header.flags & kHasExtensions) != 0) {
-    streams.extensions.resize(kMaxExtensionBytes);
-    streams.extensions.resize(data.read(streams.extensions));
-  }
+  // Also without extensions, so that the checksum at the end is tested.
+  streams.extensions.resize(kMaxExtensionBytes);
+  streams.extensions.resize(data.read(streams.extensions));
+  if ((header.flags & kHasExtensions) == 0) streams.extensions.clear();
   return unpack(path, header, streams, std::move(list), warn);
 }
 

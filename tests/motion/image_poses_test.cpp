@@ -205,6 +205,12 @@ TEST_F(ImagePosesFile, NeedsTwoImagesWithDifferentNames) {
                        "a frame has neither file_path nor time"));
 }
 
+TEST_F(ImagePosesFile, JsonWithoutFramesIsAnError) {
+  EXPECT_TRUE(
+      contains(error("poses.json", "{}"), "poses.json: must be a transforms.json, an object with a list of frames"));
+  EXPECT_TRUE(contains(error("poses.json", "0 1 2 3 0 0 0 1\n"), "poses.json: byte 3: is not valid JSON"));
+}
+
 TEST_F(ImagePosesFile, TruncatedModelsAreErrors) {
   const std::string bytes = test::images_bin(some_images(4));
   for (std::size_t size = 0; size < bytes.size(); ++size)

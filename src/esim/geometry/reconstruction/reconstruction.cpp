@@ -46,7 +46,8 @@ std::optional<ReconstructionFile> find_reconstruction(const fs::path& path, Reco
   if (fs::is_directory(path, ignored)) return find_in_folder(path, part);
   if (!is_file(path)) return std::nullopt;
   const std::string stem = path.stem().string(), extension = path.extension().string();
-  if (extension == ".json" && text_of_reconstruction(path).find("\"frames\"") != std::string::npos)
+  const auto lists_frames = [&] { return text_of_reconstruction(path).find("\"frames\"") != std::string::npos; };
+  if (extension == ".json" && (part == ReconstructionPart::images || lists_frames()))
     return ReconstructionFile{ReconstructionKind::transforms, path};
   if (extension != ".bin" && extension != ".txt") return std::nullopt;
   if (stem == name_of(part)) return ReconstructionFile{ReconstructionKind::colmap, path};

@@ -20,8 +20,8 @@ struct ReconstructionFile {
 enum class ReconstructionPart { cameras, images };
 
 /// The file that contains this part of a reconstruction. `path` is the folder of a COLMAP model (in which .bin is
-/// preferred to .txt), one of the files in it, the folder of a transforms.json, or a .json file that lists frames.
-/// Empty for other files. Throws UserError for a folder, or a file of a model, without the part.
+/// preferred to .txt), one of the files in it, the folder of a transforms.json, or a .json file (for cameras, one
+/// that lists frames). Empty for other files. Throws UserError for a folder, or a file of a model, without the part.
 std::optional<ReconstructionFile> find_reconstruction(const std::filesystem::path& path, ReconstructionPart part);
 
 /// A camera whose principal point is relative to the upper left corner of the image, where the centre of the first

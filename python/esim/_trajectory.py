@@ -77,7 +77,10 @@ class Trajectory:
 
     @classmethod
     def load(cls, path, *, order=5, knot_interval_s=0.0, smoothing_time_s=0.0):
-        """Fits a spline to the poses of a file, TUM text or CSV of the original ESIM.
+        """Fits a spline to the poses of a file.
+
+        The file is TUM text, CSV of the original ESIM, a COLMAP model (folder or images file) or a transforms.json.
+        Images without times follow each other at 30 Hz.
 
         Parameters
         ----------

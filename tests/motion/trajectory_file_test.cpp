@@ -142,7 +142,8 @@ TEST_F(TrajectoryFile, SaysWhyAFileCannotBeRead) {
   };
   EXPECT_TRUE(
       contains(error_at(directory_.path() / "missing.csv"), "missing.csv: cannot open the trajectory: No such file"));
-  EXPECT_TRUE(contains(error_at(directory_.path()), "cannot read the trajectory; is it a directory?"));
+  EXPECT_TRUE(contains(error_at(directory_.path()),
+                       "the folder contains neither images.bin nor images.txt nor transforms.json"));
 }
 
 }  // namespace

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <cmath>
 #include <numbers>
 
 #include "esim/compose/compose.h"
@@ -56,12 +57,35 @@ std::shared_ptr<const Trajectory> fit_animation(const SceneMotion& motion, TimeN
   }
 }
 
+/// Says what a file of images' poses leaves open: their rate and, unless `up` is given, which way is up.
+void note_images(const TrajectoryFile& file, const FileTrajectoryOptions& options, const std::string& key,
+                 const Notices& notices) {
+  if (!file.rate_hz && !file.image_up) return;
+  std::string text = fmt::format("{} {}: {} poses", key, options.path.string(), file.poses.size());
+  if (file.rate_hz) text += fmt::format(" at {:g} Hz", *file.rate_hz);
+  if (file.image_up && !options.up) {
+    const auto rounded = [](double value) { return std::round(100 * value) / 100 + 0.0; };  // no -0
+    const Eigen::Vector3d up = file.image_up->unaryExpr(rounded);
+    text += fmt::format("; the images' mean up direction is [{:.2f}, {:.2f}, {:.2f}]; {}.up turns it to z", up.x(),
+                        up.y(), up.z(), key);
+  }
+  notices.note(text);
+}
+
 // One overload per type of trajectory.
 
 std::shared_ptr<const Trajectory> build(const FileTrajectoryOptions& options, const Mover& mover,
                                         const Notices& notices) {
   if (options.path.empty()) throw UserError(fmt::format("{}.path: is missing; name a file of poses", mover.key));
-  std::vector<TimedPose> poses = read_trajectory(options.path);
+  const TrajectoryFileOptions coordinates{options.rate_hz, options.scale, options.up};
+  try {
+    check_options(coordinates);
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("{}.{}", mover.key, error.what()));
+  }
+  TrajectoryFile file = read_trajectory_file(options.path, coordinates);
+  note_images(file, options, mover.key, notices);
+  std::vector<TimedPose>& poses = file.poses;
   for (TimedPose& pose : poses) pose.t = std::llround(static_cast<double>(pose.t) * options.time_scale);
   try {
     return fit(poses, {options.order, options.knot_interval_s, options.smoothing_time_s}, mover.key, notices);

@@ -7,6 +7,9 @@
 
 #include "esim/core/error.h"
 #include "esim/core/inputs/used_files.h"
+#include "esim/geometry/reconstruction/colmap.h"
+#include "esim/geometry/reconstruction/reconstruction.h"
+#include "esim/geometry/reconstruction/transforms.h"
 
 namespace esim::inline geometry {
 namespace {
@@ -172,6 +175,10 @@ YAML::Node load(const std::filesystem::path& file) {
 }  // namespace
 
 std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file) {
+  if (const auto found = find_reconstruction(file, ReconstructionPart::cameras)) {
+    return found->kind == ReconstructionKind::colmap ? read_colmap_calibration(found->file)
+                                                     : read_transforms_calibration(found->file);
+  }
   const YAML::Node root = load(file);
   std::vector<CalibratedCamera> cameras;
   try {
@@ -181,9 +188,11 @@ std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file
     throw UserError(fmt::format("calibration {}: the layout is not as expected: {}", file.string(), exception.msg));
   }
   if (cameras.empty()) {
-    throw UserError(fmt::format(
-        "calibration {}: contains no cameras; expected a Kalibr camchain (cam0: ...) or a rig (cameras: - camera: ...)",
-        file.string()));
+    throw UserError(
+        fmt::format("calibration {}: contains no cameras; expected a Kalibr camchain (cam0: ...), a rig (cameras: - "
+                    "camera: ...), a "
+                    "COLMAP model (cameras.bin, cameras.txt) or a transforms.json",
+                    file.string()));
   }
   return cameras;
 }

@@ -19,7 +19,12 @@ struct CalibratedCamera {
 /// Reads the cameras of a rig, in the file's order, from
 ///  - a Kalibr camchain (`cam0: {camera_model: pinhole, intrinsics, distortion_model, ...}`): the body is the IMU where
 ///    the file has T_cam_imu, and cam0 otherwise. All sensors share one clock: a timeshift_cam_imu must be 0;
-///  - the original ESIM's rig file (`cameras: - camera: {...}  T_B_C: {...}`).
+///  - the original ESIM's rig file (`cameras: - camera: {...}  T_B_C: {...}`);
+///  - a COLMAP model (the folder, or its cameras.bin or cameras.txt): each of its cameras, named camera1 for number 1,
+///  with
+///    the body's pose;
+///  - a transforms.json of NeRF, nerfstudio or instant-ngp: its different intrinsics, named camera1, camera2, ..., with
+///    the body's pose. In both, the centre of the first pixel is (0.5, 0.5), so that cx and cy become smaller by 0.5.
 /// Throws UserError, naming the file, the camera and the key, if a value is missing, inconsistent or not supported.
 std::vector<CalibratedCamera> read_calibration(const std::filesystem::path& file);
 

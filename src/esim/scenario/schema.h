@@ -59,9 +59,11 @@ void describe_geometry(Visitor& visit, CameraOptions& o) {
 template <class Visitor>
 void describe(Visitor& visit, CameraOptions& o) {
   visit("name", o.name, About{"name, unique within the rig (default: cam0, cam1, ...)"});
-  visit("calibration", o.calibration,
-        About{"calibration file: a Kalibr camchain or a rig file of the original ESIM; gives size, intrinsics, "
-              "distortion and pose of one camera or several"});
+  visit(
+      "calibration", o.calibration,
+      About{
+          "calibration: a Kalibr camchain, a rig file of the original ESIM, a COLMAP model (folder or cameras file) or "
+          "a transforms.json; gives size, intrinsics, distortion and pose of one camera or several"});
   describe_geometry(visit, o);
   visit("fill_factor", o.fill_factor,
         About{"the part of a pixel's area that sees light, a square in its middle", "", 0.01, 1});

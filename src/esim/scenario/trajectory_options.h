@@ -19,6 +19,9 @@ struct FileTrajectoryOptions {
   static constexpr const char* kType = "file";
   static constexpr bool kHasDuration = true;
   std::filesystem::path path;
+  std::optional<double> rate_hz;
+  double scale = 1.0;
+  std::optional<Eigen::Vector3d> up;
   double time_scale = 1.0;
   int order = 5;
   double knot_interval_s = 0.0;
@@ -27,7 +30,13 @@ struct FileTrajectoryOptions {
 
 template <class Visitor>
 void describe(Visitor& visit, FileTrajectoryOptions& o) {
-  visit("path", o.path, About{"file of poses: TUM text (s) or CSV (ns); the content decides which"});
+  visit("path", o.path,
+        About{"poses: TUM text (s), CSV (ns), a COLMAP model (folder or images file) or a transforms.json"});
+  visit("rate_hz", o.rate_hz,
+        About{"images per second, for poses of images without stamps (default: 30)", "Hz", 0, 1e6, true});
+  visit("scale", o.scale, About{"factor that converts the file's positions to metres", "", 0, 1e6, true});
+  visit("up", o.up,
+        About{"direction in the file's coordinates that becomes z, by the smallest rotation (default: same axes)"});
   visit("time_scale", o.time_scale, About{"factor on the duration: 2 takes twice as long", "", 0, 1e6, true});
   visit("order", o.order, About{"order of the fitted spline: 4 (cubic) to 6", "", 4, 6});
   visit("knot_interval_s", o.knot_interval_s,

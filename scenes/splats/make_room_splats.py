@@ -1,6 +1,6 @@
 """Make room.spz, the room of ../room/room.obj as Gaussian splats, whose geometry and linear colours are known.
 
-Run:  python3 make_room_splats.py [--count N] [output file]        (needs NumPy and Pillow; 1 to 5 min)
+Run:  python3 make_room_splats.py [--count N] [output file]        (needs NumPy and Pillow; 3 min)
 
 Splats are flat, lie on the triangles, and are small where ../room/trajectory.txt shows much detail. The output is .spz,
 or .ply in full precision. Colours are linear light: a PLY says so, for .spz set `light: linear` in the scenario. The
@@ -19,7 +19,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 ROOM = os.path.join(HERE, "..", "room")
 CAMERA = (346 / 2 / np.tan(np.radians(75 / 2)), 346, 260)  # focal length, width and height in pixels, of ../room.yaml
 FINEST = 0.5     # px, side of the smallest splats where the camera is nearest
-COUNT = 150_000
+COUNT = 400_000
 
 
 def read_poses(step):

@@ -4,13 +4,13 @@ import dataclasses
 import numpy as np
 
 SPREAD = 0.6           # standard deviation / side of the cell
-SPREAD_AT_EDGE = 0.5   # across the edge of a patch, so that splats stick out less
+SPREAD_AT_EDGE = 0.45  # across the edge of a patch, so that splats stick out less
 OPACITY = 0.98
 FLATNESS = 0.02        # standard deviation across the surface / along it
-LAYER = 0.00025        # m between the splats that overlap, so that their order along a ray is the same from everywhere
+LAYER = 0.00006        # m between the splats that overlap, so that their order along a ray is the same from everywhere
 REACH = 3.0            # standard deviations; farther away, splats do not matter
 SAMPLES = 4            # a cell is compared with the texture at SAMPLES x SAMPLES points at most
-ITERATIONS = 20
+ITERATIONS = 4         # few, since the blend is compared at the centres of the smallest cells only
 BEHIND = 0.2           # colour of what is seen through gaps
 
 

@@ -8,7 +8,7 @@ RAMP = 0.6             # part of the error of a linear ramp that overlapping spl
 BEHIND_M = 0.03        # m, behind another surface, where cells are hidden
 KEEP = 0.015           # m, of hidden cells that are kept next to visible ones
 VOXEL = 0.01           # m
-BENT = 0.985           # length of the mean of the unit normals of a cell, below which it is divided
+BENT = 0.5             # error of a cell whose normals point everywhere
 HALF = 2               # the depth maps have a pixel per HALF x HALF pixels
 
 
@@ -106,7 +106,7 @@ class Tree:
                 gy = (m[1::2, 0::2] + m[1::2, 1::2] - m[0::2, 0::2] - m[0::2, 1::2]) / 2
                 variance -= np.minimum(RAMP * (gx ** 2 + gy ** 2).sum(-1) / 3, RAMP * variance)
             error = w * variance * np.minimum(px, 1)
-            error[(np.linalg.norm(normal, axis=-1) < BENT * a)] += 1e6
+            error += w * BENT * np.maximum(1 - (np.linalg.norm(normal, axis=-1) / n) ** 2, 0) * (a > 0)
             self.errors.insert(0, error)
             self.used.insert(0, a > 0)
             previous = mean_shown

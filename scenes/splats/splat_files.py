@@ -5,7 +5,7 @@ import zlib
 import numpy as np
 
 C0 = 0.28209479177387814  # the spherical harmonic of degree 0
-SPZ_BITS = 12             # of a position, behind the point
+SPZ_BITS = 16             # of a position, behind the point
 
 
 def write_ply(path, splats, opacity):

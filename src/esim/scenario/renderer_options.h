@@ -141,7 +141,7 @@ struct SplatsRendererOptions {
   double gain = 1.0;
   std::optional<SplatFilter> filter;
   SplatProjection projection = SplatProjection::automatic;
-  SplatOrder order = SplatOrder::ray;
+  SplatOrder order = SplatOrder::distance;
   LightingOptions lighting;
   double background = 0.0;
 };
@@ -168,9 +168,8 @@ void describe(Visitor& visit, SplatsRendererOptions& o) {
         About{"linear: by the pinhole's Jacobian at the centre of each splat; unscented: seven points of each splat, "
               "exactly through the lens; auto: linear without distortion, unscented otherwise"});
   visit("order", o.order,
-        About{"order in which splats are blended. ray: by depth along the ray of each pixel; distance: by the distance "
-              "of their centres, as in the original 3D Gaussian splatting, where changes of the order fire false "
-              "events"});
+        About{"order in which splats are blended, by their centres: distance, which does not change when the camera "
+              "turns, or depth, as in the original 3D Gaussian splatting, where it does and fires false events"});
   visit("lighting", o.lighting, About{"of meshes; unlit: a surface is as bright as its texture"});
   visit("background", o.background, About{"irradiance behind everything", "", 0, 1e6});
 }
@@ -423,7 +422,7 @@ inline constexpr std::array<const char*, 3> kEnumNames<SplatFilter>{"dilated", "
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<SplatProjection>{"auto", "linear", "unscented"};
 template <>
-inline constexpr std::array<const char*, 2> kEnumNames<SplatOrder>{"ray", "distance"};
+inline constexpr std::array<const char*, 2> kEnumNames<SplatOrder>{"distance", "depth"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<BlenderEngine>{"cycles", "eevee"};
 template <>

@@ -177,37 +177,63 @@ Projector::Projector(const Camera& camera, SplatProjection projection, float foo
       J << rays.dx_du(x, y), rays.dx_dv(x, y), rays.dy_du(x, y), rays.dy_dv(x, y);
       const float norm = J.norm();
       largest = std::max(largest, norm), smallest = std::min(smallest, std::abs(J.determinant()) / norm);
-      widest_ = std::max({widest_, std::abs(rays.x(x, y)), std::abs(rays.y(x, y))});
       limit_x_ = std::max(limit_x_, std::abs(rays.x(x, y))), limit_y_ = std::max(limit_y_, std::abs(rays.y(x, y)));
     }
   }
   limit_x_ *= 1.3F, limit_y_ *= 1.3F;  // as in the original 3D Gaussian splatting
-  bearing_per_px_ = largest;
-  stretch_ = linear_ ? 1 : 2 * largest / smallest;
+  margin_ = largest * (1 + kReach * std::sqrt(0.3F * area_));
+  // The Jacobian of a bearing r by a point at depth Z is at most sqrt(1 + r²) / Z. Unscented points are nearer, and the
+  // lens magnifies them by more than at the place where they are seen.
+  reach_ = kReach * std::sqrt(1 + limit_x_ * limit_x_ + limit_y_ * limit_y_) * (linear_ ? 1 : 2 * largest / smallest);
 }
 
-BearingRect Projector::bounds(const SplatCluster& cluster, const SplatView& view) const {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  BearingRect rect{kInfinity, -kInfinity, kInfinity, -kInfinity};
-  float nearest = kInfinity, farthest = -kInfinity;
-  for (int corner = 0; corner < 8; ++corner) {
-    const Eigen::Vector3f point(corner & 1 ? cluster.high.x() : cluster.low.x(),
-                                corner & 2 ? cluster.high.y() : cluster.low.y(),
-                                corner & 4 ? cluster.high.z() : cluster.low.z());
-    const Eigen::Vector3f p = view.R_camera_group * (point - view.position);
-    nearest = std::min(nearest, p.z()), farthest = std::max(farthest, p.z());
-    const float inverse = 1 / std::max(p.z(), kNearest);
-    rect.left = std::min(rect.left, p.x() * inverse), rect.right = std::max(rect.right, p.x() * inverse);
-    rect.top = std::min(rect.top, p.y() * inverse), rect.bottom = std::max(rect.bottom, p.y() * inverse);
+void ClusterBoxes::resize(std::size_t count) {
+  for (auto* of_axes : {&middle, &half}) {
+    for (std::vector<float>& values : *of_axes) values.resize(count);
   }
-  if (farthest < kNearest) return {1, 0, 1, 0};
-  const float closest = nearest - (linear_ ? 0 : std::numbers::sqrt3_v<float> * cluster.deviation);
-  if (closest < kNearest) return {-kInfinity, kInfinity, -kInfinity, kInfinity};
-  // The Jacobian by a point is at most sqrt(1 + r²) / z per bearing; and the filter of the image.
-  const float r2 = 2 * 1.69F * widest_ * widest_;
-  const float deviation = stretch_ * cluster.deviation * std::sqrt(1 + r2) / closest;
-  const float margin = kReach * (deviation + bearing_per_px_ * std::sqrt(0.3F * area_)) + bearing_per_px_;
-  return {rect.left - margin, rect.right + margin, rect.top - margin, rect.bottom + margin};
+  reach.resize(count);
+}
+
+void ClusterBoxes::append(const ClusterBoxes& other, std::size_t i) {
+  for (std::size_t k = 0; k < 3; ++k)
+    middle[k].push_back(other.middle[k][i]), half[k].push_back(other.half[k][i]);
+  reach.push_back(other.reach[i]);
+}
+
+void ClusterBoxes::find_visible(const BearingRect& rect, std::vector<std::uint8_t>& visible) const {
+  visible.resize(size());
+  const float *mx = middle[0].data(), *my = middle[1].data(), *mz = middle[2].data();
+  const float *hx = half[0].data(), *hy = half[1].data(), *hz = half[2].data(), *beyond = reach.data();
+  std::uint8_t* to = visible.data();
+  const auto [left, right, top, bottom] = rect;
+#pragma omp simd
+  for (std::size_t i = 0; i < visible.size(); ++i) {
+    // The planes through the camera and the sides of the rectangle
+    const float l = mx[i] - left * mz[i] + hx[i] + std::abs(left) * hz[i];
+    const float r = right * mz[i] - mx[i] + hx[i] + std::abs(right) * hz[i];
+    const float t = my[i] - top * mz[i] + hy[i] + std::abs(top) * hz[i];
+    const float b = bottom * mz[i] - my[i] + hy[i] + std::abs(bottom) * hz[i];
+    const float inside = std::min(std::min(l, r), std::min(t, b)) + beyond[i];
+    to[i] = static_cast<std::uint8_t>((inside >= 0) & (mz[i] + hz[i] > kNearest));
+  }
+}
+
+void Projector::find_boxes(const SplatGroup& group, const SplatView& view, ClusterBoxes& boxes) const {
+  boxes.resize(group.clusters.size());
+  for (int row = 0; row < 3; ++row) {
+    const auto k = static_cast<std::size_t>(row);
+    const float rx = view.R_camera_group(row, 0), ry = view.R_camera_group(row, 1), rz = view.R_camera_group(row, 2);
+    const float cx = view.position.x(), cy = view.position.y(), cz = view.position.z();
+    const float *mx = group.box_middle[0].data(), *my = group.box_middle[1].data(), *mz = group.box_middle[2].data();
+    const float *hx = group.box_half[0].data(), *hy = group.box_half[1].data(), *hz = group.box_half[2].data();
+    float *middle = boxes.middle[k].data(), *half = boxes.half[k].data();
+#pragma omp simd
+    for (std::size_t i = 0; i < boxes.size(); ++i) {
+      middle[i] = rx * (mx[i] - cx) + ry * (my[i] - cy) + rz * (mz[i] - cz);
+      half[i] = std::abs(rx) * hx[i] + std::abs(ry) * hy[i] + std::abs(rz) * hz[i];
+    }
+  }
+  for (std::size_t i = 0; i < boxes.size(); ++i) boxes.reach[i] = reach_ * group.largest_deviation[i];
 }
 
 template <class Lens>
@@ -273,7 +299,8 @@ void Projector::project_through(const Lens& lens, const SplatGroup& group, const
     const Lanes half_width = hn::Sqrt(hn::Mul(reach2, xx)), half_height = hn::Sqrt(hn::Mul(reach2, yy));
 
     const LaneVector colour = colours_of(group, i, from_camera);
-    const Lanes distance = hn::Sqrt(dot(mean, mean));
+    // Without the rotation, so that turning the camera does not even change its rounding
+    const Lanes distance = hn::Sqrt(dot(from_camera, from_camera));
     const LaneRect rect{hn::Ceil(hn::Sub(shape.centre.x, half_width)), hn::Floor(hn::Add(shape.centre.x, half_width)),
                         hn::Ceil(hn::Sub(shape.centre.y, half_height)),
                         hn::Floor(hn::Add(shape.centre.y, half_height))};

@@ -2,7 +2,10 @@
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
+#include <cstdint>
+#include <vector>
 
 #include "esim/backends/splats/projected_cluster.h"
 #include "esim/backends/splats/splat_scene.h"
@@ -35,9 +38,23 @@ struct SplatView {
 struct BearingRect {
   float left, right, top, bottom;
 
-  bool overlaps(const BearingRect& other) const {
-    return left <= other.right && other.left <= right && top <= other.bottom && other.top <= bottom;
+  BearingRect with(const BearingRect& other) const {
+    return {std::min(left, other.left), std::max(right, other.right), std::min(top, other.top),
+            std::max(bottom, other.bottom)};
   }
+};
+
+/// Boxes around the centres of clusters in the camera frame, and how far splats reach beyond them, per cluster; m.
+struct ClusterBoxes {
+  std::array<std::vector<float>, 3> middle, half;
+  std::vector<float> reach;
+
+  std::size_t size() const { return reach.size(); }
+  void resize(std::size_t count);
+  void append(const ClusterBoxes& other, std::size_t i);
+
+  /// Finds the clusters of which something may be visible in the rectangle: 1, or 0 for the others.
+  void find_visible(const BearingRect& rect, std::vector<std::uint8_t>& visible) const;
 };
 
 /// Projects splats to the image of a camera.
@@ -46,8 +63,13 @@ class Projector {
   /// `footprint`: side of the square that pixels average over, px.
   Projector(const Camera& camera, SplatProjection projection, float footprint);
 
-  /// Bearings outside which nothing of a cluster is visible; empty (left > right) if it is behind the camera.
-  BearingRect bounds(const SplatCluster& cluster, const SplatView& view) const;
+  /// The boxes of all clusters of a group.
+  void find_boxes(const SplatGroup& group, const SplatView& view, ClusterBoxes& boxes) const;
+
+  /// The bearings at which a splat may be visible that is seen in the rectangle, because of the filter of the image.
+  BearingRect widened(const BearingRect& rect) const {
+    return {rect.left - margin_, rect.right + margin_, rect.top - margin_, rect.bottom + margin_};
+  }
 
   /// Projects the splats of a cluster. `object` as in ScreenSplat.
   void project(const SplatGroup& group, const SplatCluster& cluster, const SplatView& view, float object,
@@ -63,9 +85,8 @@ class Projector {
   float area_;                       // square of the footprint, px²
   float domain_;                     // radius of the ideal points that the lens can show
   float limit_x_ = 0, limit_y_ = 0;  // of the bearings at which the Jacobian of a linear projection is taken
-  float widest_ = 0;                 // the largest bearing in the image
-  float stretch_ = 1;                // of uncertain size in unscented projections: at most
-  float bearing_per_px_ = 0;         // at most
+  float reach_ = 0;                  // of a splat in the image, in standard deviations at its depth
+  float margin_ = 0;                 // of the filter of the image, in bearings
 };
 
 }  // namespace esim::inline backends::inline splats

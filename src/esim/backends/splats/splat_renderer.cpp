@@ -24,15 +24,15 @@ struct BinPart {
 
 /// Cuts tiles at the bins.
 std::vector<BinPart> parts_of(const std::vector<Tile>& tiles, int width, int height) {
-  const int columns = (width + Bin::kSide - 1) / Bin::kSide, rows = (height + Bin::kSide - 1) / Bin::kSide;
+  const int columns = (width + Compositor::kSide - 1) / Compositor::kSide, rows = (height + Compositor::kSide - 1) / Compositor::kSide;
   std::vector<int> index(static_cast<std::size_t>(columns * rows), -1);
   std::vector<BinPart> parts;
   for (const Tile& tile : tiles) {
-    for (int top = tile.y / Bin::kSide * Bin::kSide; top < tile.y + tile.height; top += Bin::kSide) {
-      for (int left = tile.x / Bin::kSide * Bin::kSide; left < tile.x + tile.width; left += Bin::kSide) {
-        const int x0 = std::max(left, tile.x), x1 = std::min(left + Bin::kSide, tile.x + tile.width);
-        const int y0 = std::max(top, tile.y), y1 = std::min(top + Bin::kSide, tile.y + tile.height);
-        int& part = index[static_cast<std::size_t>(top / Bin::kSide * columns + left / Bin::kSide)];
+    for (int top = tile.y / Compositor::kSide * Compositor::kSide; top < tile.y + tile.height; top += Compositor::kSide) {
+      for (int left = tile.x / Compositor::kSide * Compositor::kSide; left < tile.x + tile.width; left += Compositor::kSide) {
+        const int x0 = std::max(left, tile.x), x1 = std::min(left + Compositor::kSide, tile.x + tile.width);
+        const int y0 = std::max(top, tile.y), y1 = std::min(top + Compositor::kSide, tile.y + tile.height);
+        int& part = index[static_cast<std::size_t>(top / Compositor::kSide * columns + left / Compositor::kSide)];
         if (part < 0) part = static_cast<int>(parts.size()), parts.push_back({left, top, {}});
         parts[static_cast<std::size_t>(part)].tiles.push_back({x0, y0, x1 - x0, y1 - y0});
       }
@@ -44,7 +44,6 @@ std::vector<BinPart> parts_of(const std::vector<Tile>& tiles, int width, int hei
 /// A cluster that may be visible in a request.
 struct SeenCluster {
   std::size_t group, cluster;
-  BearingRect bounds;
 };
 
 class SplatRenderer final : public ProcessorRenderer {
@@ -59,8 +58,9 @@ class SplatRenderer final : public ProcessorRenderer {
         filters_(filters),
         curve_(scene_->light, options.display_gamma),
         surfaces_(std::move(surfaces)) {
-    for (int top = 0; top < rays_.x.height(); top += Bin::kSide) {
-      for (int left = 0; left < rays_.x.width(); left += Bin::kSide) bins_.push_back(bearings_of(left, top));
+    for (int top = 0; top < rays_.x.height(); top += Compositor::kSide) {
+      for (int left = 0; left < rays_.x.width(); left += Compositor::kSide)
+        bins_.push_back(projector_.widened(bearings_of(left, top)));
     }
   }
 
@@ -69,18 +69,19 @@ class SplatRenderer final : public ProcessorRenderer {
  private:
   struct Work;
   struct RequestWork;
+  struct ThreadWork;
 
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override;
   void collect(const RenderRequest& request, RequestWork& work) const;
-  void render_part(const RenderRequest& request, const RequestWork& work, const BinPart& part, Compositor& compositor,
+  void render_part(const RenderRequest& request, const RequestWork& work, const BinPart& part, ThreadWork& thread,
                    Sample& sample) const;
   void write(const Compositor& compositor, int left, int top, const Tile& tile, Sample& sample) const;
   void render_surfaces(std::span<const RenderRequest> requests, Sample& sample) const;
   BearingRect bearings_of(int left, int top) const;
 
   const BearingRect& bearings(const BinPart& part) const {
-    const int columns = (rays_.x.width() + Bin::kSide - 1) / Bin::kSide;
-    return bins_[static_cast<std::size_t>(part.top / Bin::kSide * columns + part.left / Bin::kSide)];
+    const int columns = (rays_.x.width() + Compositor::kSide - 1) / Compositor::kSide;
+    return bins_[static_cast<std::size_t>(part.top / Compositor::kSide * columns + part.left / Compositor::kSide)];
   }
 
   std::unique_ptr<Work> take_work() const {
@@ -104,7 +105,7 @@ class SplatRenderer final : public ProcessorRenderer {
   ColourFilters filters_;
   DisplayCurve curve_;
   SplatSurfaces surfaces_;
-  std::vector<BearingRect> bins_;
+  std::vector<BearingRect> bins_;  // where splats are that the bin may show
   mutable std::mutex mutex_;
   mutable std::vector<std::unique_ptr<Work>> idle_;  // memory, which is expensive to request for each image
 };
@@ -114,23 +115,31 @@ struct SplatRenderer::RequestWork {
   std::vector<SplatView> views;  // per group of the scene
   std::vector<BinPart> parts;
   std::vector<Twist> twists;
+  ClusterBoxes boxes;  // of the last group
+  std::vector<std::uint8_t> visible;
   std::vector<SeenCluster> seen;
+  ClusterBoxes seen_boxes;
   std::size_t first = 0;  // of its clusters in Work::projected
   const ProjectedCluster* projected = nullptr;
+};
+
+struct SplatRenderer::ThreadWork {
+  Compositor compositor;
+  std::vector<std::uint8_t> visible;
 };
 
 struct SplatRenderer::Work {
   std::vector<RequestWork> requests;
   std::vector<ProjectedCluster> projected;
-  std::vector<Compositor> compositors;  // per thread
+  std::vector<ThreadWork> threads;
 };
 
 /// The bearings of all places in a bin.
 BearingRect SplatRenderer::bearings_of(int left, int top) const {
   constexpr float kInfinity = std::numeric_limits<float>::infinity();
   BearingRect rect{kInfinity, -kInfinity, kInfinity, -kInfinity};
-  for (int y = top; y < std::min(top + Bin::kSide, rays_.x.height()); ++y) {
-    for (int x = left; x < std::min(left + Bin::kSide, rays_.x.width()); ++x) {
+  for (int y = top; y < std::min(top + Compositor::kSide, rays_.x.height()); ++y) {
+    for (int x = left; x < std::min(left + Compositor::kSide, rays_.x.width()); ++x) {
       const float half_width = std::abs(rays_.dx_du(x, y)) + std::abs(rays_.dx_dv(x, y));
       const float half_height = std::abs(rays_.dy_du(x, y)) + std::abs(rays_.dy_dv(x, y));
       rect.left = std::min(rect.left, rays_.x(x, y) - half_width);
@@ -144,29 +153,34 @@ BearingRect SplatRenderer::bearings_of(int left, int top) const {
 
 /// Finds the clusters that a request may see.
 void SplatRenderer::collect(const RenderRequest& request, RequestWork& work) const {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
-  work.views.clear(), work.seen.clear();
+  work.views.clear(), work.seen.clear(), work.seen_boxes.resize(0);
   work.parts = parts_of(request.tiles, rays_.x.width(), rays_.x.height());
   work.twists = relative_twists(request);
-  BearingRect whole{kInfinity, -kInfinity, kInfinity, -kInfinity};
-  for (const BinPart& part : work.parts) {
-    const BearingRect& bin = bearings(part);
-    whole = {std::min(whole.left, bin.left), std::max(whole.right, bin.right), std::min(whole.top, bin.top),
-             std::max(whole.bottom, bin.bottom)};
-  }
-  constexpr std::size_t kFewParts = 64;  // more are tested as a whole
+  BearingRect whole = bearings(work.parts.front());
+  for (const BinPart& part : work.parts) whole = whole.with(bearings(part));
   for (std::size_t g = 0; g < scene_->groups.size(); ++g) {
     const auto& [group, object, to_object] = scene_->groups[g];
-    const SplatView& view = work.views.emplace_back(request, object, to_object);
-    for (std::size_t c = 0; c < group.clusters.size(); ++c) {
-      const BearingRect bounds = projector_.bounds(group.clusters[c], view);
-      if (!bounds.overlaps(whole)) continue;
-      if (work.parts.size() <= kFewParts && std::ranges::none_of(work.parts, [&](const BinPart& part) {
-            return bounds.overlaps(bearings(part));
-          }))
-        continue;
-      work.seen.push_back({g, c, bounds});
+    projector_.find_boxes(group, work.views.emplace_back(request, object, to_object), work.boxes);
+    work.boxes.find_visible(whole, work.visible);
+    for (std::size_t c = 0; c < work.visible.size(); ++c) {
+      if (work.visible[c] == 0) continue;
+      work.seen.push_back({g, c});
+      work.seen_boxes.append(work.boxes, c);
     }
+  }
+  constexpr std::size_t kFewParts = 16;  // whose rectangle may be much larger than they are
+  if (work.parts.size() == 1 || work.parts.size() > kFewParts) return;
+  std::vector<std::uint8_t> anywhere(work.seen.size());
+  for (const BinPart& part : work.parts) {
+    work.seen_boxes.find_visible(bearings(part), work.visible);
+    for (std::size_t i = 0; i < anywhere.size(); ++i) anywhere[i] |= work.visible[i];
+  }
+  work.boxes.resize(0);
+  std::swap(work.boxes, work.seen_boxes);
+  std::vector<SeenCluster> all;
+  all.swap(work.seen);
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (anywhere[i] != 0) work.seen.push_back(all[i]), work.seen_boxes.append(work.boxes, i);
   }
 }
 
@@ -188,7 +202,7 @@ void SplatRenderer::compute(std::span<const RenderRequest> requests, Sample& sam
 
   std::unique_ptr<Work> work = take_work();
   work->requests.resize(requests.size());
-  work->compositors.resize(static_cast<std::size_t>(workers_.threads()), Compositor(options_.order));
+  work->threads.resize(static_cast<std::size_t>(workers_.threads()));
   workers_.for_each(static_cast<int>(requests.size()), [&](int r) {
     collect(requests[static_cast<std::size_t>(r)], work->requests[static_cast<std::size_t>(r)]);
   });
@@ -218,15 +232,15 @@ void SplatRenderer::compute(std::span<const RenderRequest> requests, Sample& sam
   workers_.for_each_with_worker(static_cast<int>(parts.size()), [&](int i, int worker) {
     const auto& [r, k] = parts[static_cast<std::size_t>(i)];
     render_part(requests[r], work->requests[r], work->requests[r].parts[k],
-                work->compositors[static_cast<std::size_t>(worker)], sample);
+                work->threads[static_cast<std::size_t>(worker)], sample);
   });
   give_back(std::move(work));
 }
 
 void SplatRenderer::render_part(const RenderRequest& request, const RequestWork& work, const BinPart& part,
-                                Compositor& compositor, Sample& sample) const {
-  const int left = part.left, top = part.top, right = left + Bin::kSide - 1, bottom = top + Bin::kSide - 1;
-  const BearingRect& bin = bearings(part);
+                                ThreadWork& thread, Sample& sample) const {
+  auto& [compositor, visible] = thread;
+  const int left = part.left, top = part.top, right = left + Compositor::kSide - 1, bottom = top + Compositor::kSide - 1;
   compositor.start(left, top);
   if (surfaces_.renderer != nullptr) {
     for (const Tile& tile : part.tiles) {
@@ -236,10 +250,11 @@ void SplatRenderer::render_part(const RenderRequest& request, const RequestWork&
       }
     }
   }
+  // Clusters outside are left out by the same rule in each request, so that a tile equals the frame.
+  work.seen_boxes.find_visible(bearings(part), visible);
   for (std::size_t i = 0; i < work.seen.size(); ++i) {
-    // Clusters outside are left out by the same rule in each request, so that a tile equals the frame.
     const ProjectedCluster& cluster = work.projected[i];
-    if (!work.seen[i].bounds.overlaps(bin)) continue;
+    if (visible[i] == 0) continue;
     if (cluster.last_column < left || cluster.first_column > right || cluster.last_row < top ||
         cluster.first_row > bottom)
       continue;
@@ -249,11 +264,13 @@ void SplatRenderer::render_part(const RenderRequest& request, const RequestWork&
                                             (cluster.top[k] <= bottom) & (cluster.bottom[k] >= top));
     }
     for (std::size_t k = 0; k < cluster.count; ++k) {
-      if (inside[k] != 0)
-        compositor.add(cluster.splats[k], cluster.left[k], cluster.right[k], cluster.top[k], cluster.bottom[k]);
+      if (inside[k] == 0) continue;
+      const ScreenSplat& splat = cluster.splats[k];
+      const float order = options_.order == SplatOrder::distance ? splat.distance : 1 / splat.nearness;
+      compositor.add(splat, order, cluster.left[k], cluster.right[k], cluster.top[k], cluster.bottom[k]);
     }
   }
-  compositor.composite();
+  compositor.blend();
   for (const Tile& tile : part.tiles) {
     write(compositor, left, top, tile, sample);
     motion_field(rays_, work.twists, tile, sample, request.motion_rows);

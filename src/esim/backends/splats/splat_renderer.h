@@ -15,7 +15,7 @@ namespace esim::inline backends::inline splats {
 
 struct SplatOptions {
   SplatProjection projection = SplatProjection::automatic;
-  SplatOrder order = SplatOrder::ray;
+  SplatOrder order = SplatOrder::distance;
   double display_gamma = 0;  ///< exponent from display colours to linear light; 0: the sRGB curve
   float background = 0;      ///< irradiance behind all splats
   float gain = 1;            ///< factor from linear light to irradiance
@@ -39,13 +39,13 @@ class SplatScene;
 /// All objects must have the same SplatLight.
 std::shared_ptr<const SplatScene> build_splat_scene(const std::vector<SplatObject>& objects);
 
-/// Renders Gaussian splats on the processor. A pixel's colour is composited from front to back as in Kerbl et al., 3D
+/// Renders Gaussian splats on the processor. A pixel's colour is blended from front to back as in Kerbl et al., 3D
 /// Gaussian Splatting for Real-Time Radiance Field Rendering, 2023, eq. (3), in the space of the splats' colours, and
-/// then converted to linear light and to luminance, or to the colour that the pixel sees through its filter. Where
-/// that has steps in time, this renderer does not: splats fade out between opacities of 1.5/255 and 0.5/255, and next
-/// to the camera; with SplatOrder::ray, order changes only where two splats meet on a ray.
+/// then converted to linear light and to luminance, or to the colour that the pixel sees through its filter. Splats
+/// fade out between opacities of 1.5/255 and 0.5/255, where the original cuts them off at 1/255, and next to the
+/// camera: a cut would be a step in time.
 ///
-/// Z is the depth at which half of the light is blocked, on the plane or ellipsoid of the splat where this happens; it
+/// Z is the depth of the splat at which half of the light is blocked: the mean depth of this Gaussian in the pixel. It
 /// is infinite where less is blocked. V and objects are those of this splat.
 ///
 /// The square over which a pixel averages is represented by SplatFilter: its variance is that of the sensor's pixel,

@@ -4,8 +4,9 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
 #include <numeric>
-#include <utility>
+#include <span>
 
 namespace esim::inline backends::inline splats {
 namespace {
@@ -13,42 +14,49 @@ namespace {
 constexpr std::size_t kAlignment = 8;  // of clusters
 constexpr float kSmallest = 1e-7F;     // standard deviation that is distinguished, m
 
-/// Spreads the lowest 20 bits of x to every third bit.
-std::uint64_t spread(std::uint64_t x) {
-  x &= 0xfffff;
-  x = (x | x << 32) & 0x001f00000000ffff;
-  x = (x | x << 16) & 0x001f0000ff0000ff;
-  x = (x | x << 8) & 0x100f00f00f00f00f;
-  x = (x | x << 4) & 0x10c30c30c30c30c3;
-  return (x | x << 2) & 0x1249249249249249;
+/// Octaves between classes of size: large splats would make a cluster of small ones visible everywhere.
+constexpr float kOctaves = 2;
+
+int size_class(const Splats& splats, std::uint32_t i) {
+  const float size = std::max(splats.deviations[i].maxCoeff(), kSmallest) / kSmallest;
+  return static_cast<int>(std::log2(size) / kOctaves);
 }
 
-/// The order of splats in memory: by size, and in Z-order (Morton) among those of similar size.
-std::vector<std::uint32_t> memory_order(const Splats& splats) {
-  Eigen::Vector3f low = splats.positions[0], high = low;
-  for (const Eigen::Vector3f& p : splats.positions) low = low.cwiseMin(p), high = high.cwiseMax(p);
-  const Eigen::Vector3f scale = (high - low).cwiseMax(1e-30F).cwiseInverse() * 1048575.0F;
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> keys(splats.size());
-  for (std::size_t i = 0; i < splats.size(); ++i) {
-    const Eigen::Vector3f cell = (splats.positions[i] - low).cwiseProduct(scale);
-    const auto at = [&](int axis) { return spread(static_cast<std::uint64_t>(cell[axis])) << axis; };
-    const float size = std::max(splats.deviations[i].maxCoeff(), kSmallest) / kSmallest;
-    const auto octaves = static_cast<std::uint64_t>(std::clamp(std::log2(size) / 4, 0.0F, 15.0F));
-    keys[i] = {octaves << 60 | at(0) | at(1) | at(2), static_cast<std::uint32_t>(i)};
-  }
-  std::sort(keys.begin(), keys.end());
-  std::vector<std::uint32_t> order(keys.size());
-  std::transform(keys.begin(), keys.end(), order.begin(), [](const auto& key) { return key.second; });
-  return order;
+/// Divides splats in halves along the longest side of their box until clusters are small enough.
+void divide(const Splats& splats, std::span<std::uint32_t> order, std::vector<std::span<std::uint32_t>>& clusters) {
+  if (order.size() <= SplatCluster::kMost) return clusters.push_back(order);
+  Eigen::AlignedBox3f box;
+  for (const std::uint32_t i : order) box.extend(splats.positions[i]);
+  int axis = 0;
+  box.sizes().maxCoeff(&axis);
+  // Whole clusters, except for the last one
+  const std::size_t whole = (order.size() + SplatCluster::kMost - 1) / SplatCluster::kMost;
+  const std::size_t middle = whole / 2 * SplatCluster::kMost;
+  std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(middle), order.end(),
+                   [&](std::uint32_t a, std::uint32_t b) {
+                     const float x = splats.positions[a][axis], y = splats.positions[b][axis];
+                     return x < y || (x == y && a < b);
+                   });
+  divide(splats, order.first(middle), clusters);
+  divide(splats, order.subspan(middle), clusters);
 }
 
 }  // namespace
 
 SplatGroup::SplatGroup(const Splats& splats) : degree(splats.degree), filter(splats.filter) {
   if (splats.size() == 0) return;
-  const std::vector<std::uint32_t> order = memory_order(splats);
-  const std::size_t full = (order.size() + SplatCluster::kMost - 1) / SplatCluster::kMost;
-  size = full * SplatCluster::kMost;
+  std::vector<std::uint32_t> order(splats.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::vector<int> classes(splats.size());
+  for (const std::uint32_t i : order) classes[i] = size_class(splats, i);
+  std::ranges::stable_sort(order, std::less(), [&](std::uint32_t i) { return classes[i]; });
+  std::vector<std::span<std::uint32_t>> parts;
+  for (auto begin = order.begin(); begin != order.end();) {
+    const auto end = std::find_if(begin, order.end(), [&](std::uint32_t i) { return classes[i] != classes[*begin]; });
+    divide(splats, {begin, end}, parts);
+    begin = end;
+  }
+  size = parts.size() * SplatCluster::kMost;
   const auto resize = [&](Column& column) { column.resize(size); };
   std::ranges::for_each(centre, resize);
   for (auto& axis : axes) std::ranges::for_each(axis, resize);
@@ -56,20 +64,20 @@ SplatGroup::SplatGroup(const Splats& splats) : degree(splats.degree), filter(spl
   resize(opacity);
   harmonics.resize((splats.coefficients() - 1) * 3 * size);
 
-  for (std::size_t first = 0; first < order.size(); first += SplatCluster::kMost) {
-    const std::size_t count = std::min(order.size() - first, SplatCluster::kMost);
-    const Eigen::Vector3f& start = splats.positions[order[first]];
-    SplatCluster cluster{static_cast<std::uint32_t>(first),
-                         static_cast<std::uint32_t>((count + kAlignment - 1) / kAlignment * kAlignment), start, start,
-                         0};
+  for (const std::span<std::uint32_t> part : parts) {
+    const std::size_t first = clusters.size() * SplatCluster::kMost, count = part.size();
+    const SplatCluster cluster{static_cast<std::uint32_t>(first),
+                               static_cast<std::uint32_t>((count + kAlignment - 1) / kAlignment * kAlignment)};
+    Eigen::AlignedBox3f box;
+    float largest = 0;
     for (std::size_t i = first; i < first + cluster.count; ++i) {
-      const std::size_t from = order[std::min(i, first + count - 1)];
+      const std::size_t from = part[std::min(i - first, count - 1)];
       const Eigen::Vector3f& p = splats.positions[from];
       const Eigen::Vector3f& deviations = splats.deviations[from];
       const Eigen::Vector4f& q = splats.rotations[from];
       const Eigen::Matrix3f R = Eigen::Quaternionf(q[3], q[0], q[1], q[2]).normalized().toRotationMatrix();
-      cluster.low = cluster.low.cwiseMin(p), cluster.high = cluster.high.cwiseMax(p);
-      cluster.deviation = std::max(cluster.deviation, deviations.maxCoeff());
+      box.extend(p);
+      largest = std::max(largest, deviations.maxCoeff());
       opacity[i] = i < first + count ? splats.opacities[from] : 0;
       for (int k = 0; k < 3; ++k) {
         const auto c = static_cast<std::size_t>(k);
@@ -84,6 +92,13 @@ SplatGroup::SplatGroup(const Splats& splats) : degree(splats.degree), filter(spl
       }
     }
     clusters.push_back(cluster);
+    const Eigen::Vector3f middle = box.center();
+    const Eigen::Vector3f half = (box.max() - middle).cwiseMax(middle - box.min());
+    for (int k = 0; k < 3; ++k) {
+      box_middle[static_cast<std::size_t>(k)].push_back(middle[k]);
+      box_half[static_cast<std::size_t>(k)].push_back(half[k]);
+    }
+    largest_deviation.push_back(largest);
   }
 }
 

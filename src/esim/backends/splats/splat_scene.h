@@ -16,8 +16,6 @@ struct SplatCluster {
   static constexpr std::size_t kMost = 128;
 
   std::uint32_t first, count;  ///< of SplatGroup's arrays; both are multiples of 8
-  Eigen::Vector3f low, high;   ///< box around the centres
-  float deviation;             ///< the largest standard deviation, m
 };
 
 /// The splats of an object, in clusters. Arrays have an entry per splat; the ends of clusters are filled with splats of
@@ -28,6 +26,11 @@ struct SplatGroup {
   explicit SplatGroup(const Splats& splats);
 
   std::vector<SplatCluster> clusters;
+
+  /// Per cluster: the box around the centres (its middle and half of its sides), and the largest standard deviation; m.
+  std::array<Column, 3> box_middle, box_half;
+  Column largest_deviation;
+
   std::array<Column, 3> centre;               ///< m
   std::array<std::array<Column, 3>, 3> axes;  ///< axes[i][k]: component k of the standard deviation along axis i, m
   Column opacity;

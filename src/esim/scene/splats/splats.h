@@ -29,10 +29,10 @@ enum class SplatProjection {
   unscented,   ///< by seven points of the splat, which are projected exactly through the lens, as in 3DGUT
 };
 
-/// The order in which splats are composited.
+/// The order in which splats are blended.
 enum class SplatOrder {
-  ray,       ///< in each pixel, by the depth at which they contribute most to its ray
-  distance,  ///< everywhere by the distance of their centres
+  distance,  ///< of their centres from the camera: it stays the same when the camera turns
+  depth,     ///< of their centres, as the original 3D Gaussian splatting
 };
 
 /// A scene of three-dimensional Gaussians. All arrays have an entry per splat.

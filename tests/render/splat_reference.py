@@ -225,6 +225,10 @@ def ellipsoid_bounds(centres, axes, reach, camera):
     return bounds
 
 
+def dot(a, b):
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+
+
 def render_per_ray(splats, camera, pose, cut=MIN_ALPHA, background=0.0, near=0.01):
     """Image and median depth with the splats of each ray in the order of their maximum response along it.
 
@@ -247,9 +251,7 @@ def render_per_ray(splats, camera, pose, cut=MIN_ALPHA, background=0.0, near=0.0
     image, depth, left = start_images(camera)
     for splat, x, y in pairs(bounds, camera):
         u, v = ((x - camera.cx) / camera.fx)[:, None], ((y - camera.cy) / camera.fy)[:, None]
-        ray = lambda m: m[splat, 0] * u + m[splat, 1] * v + m[splat, 2]
-        dot = lambda a, b: a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
-        d, cross = ray(whiten), ray(crossed)
+        d, cross = (m[splat, 0] * u + m[splat, 1] * v + m[splat, 2] for m in (whiten, crossed))
         dd = dot(d, d)
         z, q = dot(d, centres_w[splat]) / dd, dot(cross, cross) / dd
         alpha = np.minimum(MAX_ALPHA, splats.opacities[splat] * np.exp(-q / 2))

@@ -94,7 +94,7 @@ def in_camera(splats, pose):
 
 
 def bounds_to_pixels(low, high, size):
-    """First and last pixel between two image coordinates; last < first if there is none."""
+    """First and last pixel between two image coordinates; last < first if it has no pixel."""
     return (np.ceil(np.clip(low, -1, size)).astype(int).clip(0), np.floor(np.clip(high, -1, size)).astype(int).clip(None, size - 1))
 
 

@@ -10,6 +10,7 @@ import argparse
 import os
 
 import numpy as np
+
 import splat_blend as blend
 import splat_cells as cells
 import splat_surface as surface

@@ -1,5 +1,6 @@
 """Which cells of the surface become a splat: small ones where cameras see much detail, large ones elsewhere."""
 import numpy as np
+
 from splat_surface import to_display
 
 FLOOR = 0.02           # weight of what no camera sees, relative to what one sees from FLOOR_DISTANCE

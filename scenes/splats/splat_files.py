@@ -15,7 +15,7 @@ def write_ply(path, splats, opacity):
     columns = np.column_stack([splats.positions, (splats.colours - 0.5) / C0, np.full(n, np.log(opacity / (1 - opacity))),
                                np.log(splats.deviations), splats.rotations])
     with open(path, "wb") as file:
-        file.write(("ply\nformat binary_little_endian 1.0\ncomment esim_light linear\nelement vertex %d\n" % n
+        file.write(("ply\nformat binary_little_endian 1.0\ncomment esim_light linear\ncomment SplatRenderMode: mip\nelement vertex %d\n" % n
                     + "".join("property float %s\n" % name for name in names) + "end_header\n").encode())
         file.write(columns.astype("<f4").tobytes())
 
@@ -39,7 +39,7 @@ def write_spz(path, splats, opacity):
     w, x, y, z = splats.rotations.T
     byte = lambda v: np.clip(np.round(v), 0, 255).astype(np.uint8)
     raw = b"".join([
-        struct.pack("<IIIBBBB", 0x5053474E, 3, n, 0, SPZ_BITS, 0, 0),
+        struct.pack("<IIIBBBB", 0x5053474E, 3, n, 0, SPZ_BITS, 1, 0),  # 1: antialiased
         fixed.view(np.uint8).reshape(n, 3, 4)[:, :, :3].tobytes(),
         byte(np.full(n, 255 * opacity)).tobytes(),
         byte((splats.colours - 0.5) / C0 * 0.15 * 255 + 127.5).tobytes(),

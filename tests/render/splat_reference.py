@@ -94,7 +94,7 @@ def in_camera(splats, pose):
 
 
 def bounds_to_pixels(low, high, size):
-    """First and last pixel between two image coordinates; last < first if there is none."""
+    """First and last pixel between two image coordinates; last < first if it has no pixel."""
     return (np.ceil(np.clip(low, -1, size)).astype(int).clip(0), np.floor(np.clip(high, -1, size)).astype(int).clip(None, size - 1))
 
 
@@ -225,6 +225,10 @@ def ellipsoid_bounds(centres, axes, reach, camera):
     return bounds
 
 
+def dot(a, b):
+    return a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
+
+
 def render_per_ray(splats, camera, pose, cut=MIN_ALPHA, background=0.0, near=0.01):
     """Image and median depth with the splats of each ray in the order of their maximum response along it.
 
@@ -247,9 +251,7 @@ def render_per_ray(splats, camera, pose, cut=MIN_ALPHA, background=0.0, near=0.0
     image, depth, left = start_images(camera)
     for splat, x, y in pairs(bounds, camera):
         u, v = ((x - camera.cx) / camera.fx)[:, None], ((y - camera.cy) / camera.fy)[:, None]
-        ray = lambda m: m[splat, 0] * u + m[splat, 1] * v + m[splat, 2]
-        dot = lambda a, b: a[:, 0] * b[:, 0] + a[:, 1] * b[:, 1] + a[:, 2] * b[:, 2]
-        d, cross = ray(whiten), ray(crossed)
+        d, cross = (m[splat, 0] * u + m[splat, 1] * v + m[splat, 2] for m in (whiten, crossed))
         dd = dot(d, d)
         z, q = dot(d, centres_w[splat]) / dd, dot(cross, cross) / dd
         alpha = np.minimum(MAX_ALPHA, splats.opacities[splat] * np.exp(-q / 2))

@@ -56,7 +56,8 @@ inline Eigen::Vector3d splat_colour(const Splats& splats, std::size_t i, const E
   Eigen::Vector3d colour(0.5, 0.5, 0.5);
   for (std::size_t k = 0; k < splats.coefficients(); ++k) {
     for (int c = 0; c < 3; ++c)
-      colour[c] += basis[k] * static_cast<double>(splats.harmonics[(i * splats.coefficients() + k) * 3 + static_cast<std::size_t>(c)]);
+      colour[c] += basis[k] * static_cast<double>(
+                                  splats.harmonics[(i * splats.coefficients() + k) * 3 + static_cast<std::size_t>(c)]);
   }
   return colour.cwiseMax(0.0);
 }
@@ -71,8 +72,7 @@ inline Image<SplatPixel> render_slowly(const Splats& splats, const Camera& camer
   };
   std::vector<std::vector<Contribution>> pixels(static_cast<std::size_t>(camera.width * camera.height));
   std::vector<Eigen::Vector3d> colours(splats.size());
-  const SE3 T_camera_splats =
-      T_world_camera.inverse() * SE3{splats.to_object, Eigen::Vector3d::Zero()};
+  const SE3 T_camera_splats = T_world_camera.inverse() * SE3{splats.to_object, Eigen::Vector3d::Zero()};
   const Eigen::Matrix3d R = T_camera_splats.rotation.toRotationMatrix();
   const Eigen::Vector3d eye = T_camera_splats.inverse().translation;
   const double limit_x = 1.3 * std::max(camera.cx, camera.width - 1 - camera.cx) / camera.fx;
@@ -82,7 +82,8 @@ inline Image<SplatPixel> render_slowly(const Splats& splats, const Camera& camer
     const Eigen::Vector3d position = splats.positions[i].cast<double>(), mean = R * (position - eye);
     if (mean.z() <= 0.01) continue;
     const Eigen::Vector4f& q = splats.rotations[i];
-    const Eigen::Matrix3d axes = R * Eigen::Quaternionf(q[3], q[0], q[1], q[2]).cast<double>().normalized().toRotationMatrix();
+    const Eigen::Matrix3d axes =
+        R * Eigen::Quaternionf(q[3], q[0], q[1], q[2]).cast<double>().normalized().toRotationMatrix();
     const Eigen::Vector3d deviations = splats.deviations[i].cast<double>();
     const Eigen::Matrix3d covariance = axes * deviations.array().square().matrix().asDiagonal() * axes.transpose();
 
@@ -117,9 +118,9 @@ inline Image<SplatPixel> render_slowly(const Splats& splats, const Camera& camer
         if (alpha <= 0) continue;
         const double depth = std::clamp(1 / std::max(1e-9, 1 / mean.z() - slope.dot(d) / (mean.z() * mean.z())),
                                         std::max(mean.z() - thickness, 0.05 * mean.z()), mean.z() + thickness);
-        const double order = rules.order == SplatRules::Order::ray      ? depth
+        const double order = rules.order == SplatRules::Order::ray     ? depth
                              : rules.order == SplatRules::Order::depth ? mean.z()
-                                                                        : mean.norm();
+                                                                       : mean.norm();
         pixels[static_cast<std::size_t>(v * camera.width + u)].push_back(
             {order, depth, std::min(alpha, 0.99), static_cast<std::uint32_t>(i)});
       }

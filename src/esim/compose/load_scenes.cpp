@@ -3,6 +3,7 @@
 #include "esim/blender/blender.h"
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
+#include "esim/geometry/upright.h"
 #include "esim/scene/splats/splat_file.h"
 
 namespace esim::inline compose {
@@ -38,15 +39,27 @@ std::filesystem::path readable(const std::filesystem::path& scene, const Notices
 }
 
 /// Loads splats with the options of their renderer.
-std::shared_ptr<const Splats> splats_of(const std::filesystem::path& path, double scale,
-                                        const SplatsRendererOptions& options, const Notices& notices) {
+Splats splats_of(const std::filesystem::path& path, double scale, const SplatsRendererOptions& options,
+                 const Notices& notices) {
   Splats splats = load_splats(path, notices.warning);
   for (Eigen::Vector3f& position : splats.positions) position *= static_cast<float>(scale);
   for (Eigen::Vector3f& deviation : splats.deviations) deviation *= static_cast<float>(scale);
   if (options.filter) splats.filter = *options.filter;
   if (options.light) splats.light = *options.light;
   notices.note(fmt::format("scene {}: {}", path.filename().string(), summary(splats)));
-  return std::make_shared<const Splats>(std::move(splats));
+  return splats;
+}
+
+/// The scene's own splats, upright.
+Splats upright_splats(const SplatsRendererOptions& options, const Notices& notices) {
+  Splats splats = splats_of(options.scene, options.scale, options, notices);
+  if (!options.up) return splats;
+  try {
+    splats.to_object = upright(*options.up);
+  } catch (const UserError& error) {
+    throw UserError(fmt::format("renderer.{}", error.what()));
+  }
+  return splats;
 }
 
 /// Loads an object: a mesh, or splats for a renderer with these.
@@ -54,7 +67,7 @@ SceneObject load_object(const ObjectOptions& options, const SplatsRendererOption
                         const Notices& notices) {
   SceneObject object{options.name, {}, true};
   if (with_splats != nullptr && is_splat_file(options.scene)) {
-    object.splats = splats_of(options.scene, options.scale, *with_splats, notices);
+    object.splats = std::make_shared<const Splats>(splats_of(options.scene, options.scale, *with_splats, notices));
     return object;
   }
   object.mesh = load_mesh(readable(options.scene, notices), notices.warning, look);
@@ -91,7 +104,7 @@ SceneFile load(const SplatsRendererOptions& options, SceneLook look, const Notic
   require_scene_path(options.scene, "scene");
   SceneFile file;
   if (is_splat_file(options.scene)) {
-    file.scene.objects.push_back({"", {}, false, splats_of(options.scene, options.scale, options, notices)});
+    file.scene.objects.push_back({"", {}, false, std::make_shared<const Splats>(upright_splats(options, notices))});
   } else {
     file = load_scene_file(readable(options.scene, notices), notices.warning, look);
     notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));

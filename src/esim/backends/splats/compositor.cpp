@@ -65,9 +65,7 @@ void Compositor::add(const ScreenSplat& splat, float order, int left, int right,
   const auto column = [&](int x) {
     return static_cast<std::uint8_t>(std::clamp(x - left_, 0, kSide - 1) / kBlockWidth);
   };
-  const auto row = [&](int y) {
-    return static_cast<std::uint8_t>(std::clamp(y - top_, 0, kSide - 1) / kBlockHeight);
-  };
+  const auto row = [&](int y) { return static_cast<std::uint8_t>(std::clamp(y - top_, 0, kSide - 1) / kBlockHeight); };
   splats_.push_back({std::bit_cast<std::uint32_t>(order), column(left), column(right), row(top), row(bottom), &splat});
 }
 

@@ -69,7 +69,7 @@ class Compositor {
   int left_ = 0, top_ = 0;
   bool surfaces_ = false;
   std::vector<Listed> splats_, sorted_;
-  std::array<Block, static_cast<std::size_t>(kColumns * kRows)> blocks_;
+  std::array<Block, static_cast<std::size_t>(kColumns* kRows)> blocks_;
   int finished_ = 0;
 };
 

@@ -11,9 +11,9 @@
 // Private to backends/splats.
 namespace esim::inline backends::inline splats {
 
-/// From the space in which splats are composited to linear light. For SplatLight::display this is a power of `gamma`, or
-/// the sRGB curve (IEC 61966-2-1) if gamma is 0; both continue above white. Between entries of the table the curve is
-/// linear, within 3e-6 of its value.
+/// From the space in which splats are composited to linear light. For SplatLight::display this is a power of `gamma`,
+/// or the sRGB curve (IEC 61966-2-1) if gamma is 0; both continue above white. Between entries of the table the curve
+/// is linear, within 3e-6 of its value.
 class DisplayCurve {
  public:
   DisplayCurve(SplatLight light, double gamma) : gamma_(static_cast<float>(gamma)) {

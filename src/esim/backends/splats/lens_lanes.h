@@ -28,8 +28,8 @@ HWY_INLINE LanePoints distorted(const NoDistortion&, LanePoints ideal) { return 
 HWY_INLINE LanePoints distorted(const RadialTangential& model, LanePoints ideal) {
   const auto set = [](double value) { return all(static_cast<float>(value)); };
   const Lanes x = ideal.x, y = ideal.y, xy = hn::Mul(x, y), r2 = hn::MulAdd(x, x, hn::Mul(y, y));
-  const Lanes radial = hn::MulAdd(hn::MulAdd(hn::MulAdd(set(model.k3), r2, set(model.k2)), r2, set(model.k1)), r2,
-                                  all(1));
+  const Lanes radial =
+      hn::MulAdd(hn::MulAdd(hn::MulAdd(set(model.k3), r2, set(model.k2)), r2, set(model.k1)), r2, all(1));
   const auto along = [&](Lanes at, double with, double across) {
     const Lanes square = hn::MulAdd(hn::Mul(all(2), at), at, r2);
     return hn::MulAdd(at, radial, hn::MulAdd(set(2 * with), xy, hn::Mul(set(across), square)));
@@ -40,8 +40,7 @@ HWY_INLINE LanePoints distorted(const RadialTangential& model, LanePoints ideal)
 /// The radius in the image over that of the ideal point, for models with radial distortion only.
 HWY_INLINE LanePoints scaled(LanePoints ideal, Lanes radius, Lanes image_radius, float at_centre) {
   const auto off_centre = hn::Gt(radius, all(1e-6F));
-  const Lanes scale =
-      hn::IfThenElse(off_centre, hn::Div(image_radius, hn::Max(radius, all(1e-6F))), all(at_centre));
+  const Lanes scale = hn::IfThenElse(off_centre, hn::Div(image_radius, hn::Max(radius, all(1e-6F))), all(at_centre));
   return {hn::Mul(ideal.x, scale), hn::Mul(ideal.y, scale)};
 }
 
@@ -58,8 +57,8 @@ HWY_INLINE LanePoints distorted(const Equidistant& model, LanePoints ideal) {
 HWY_INLINE LanePoints distorted(const Fov& model, LanePoints ideal) {
   const double slope = 2 * std::tan(model.w / 2);
   const Lanes r = radius_of(ideal);
-  const Lanes image = hn::Mul(arc_tangent(hn::Mul(r, all(static_cast<float>(slope)))),
-                              all(static_cast<float>(1 / model.w)));
+  const Lanes image =
+      hn::Mul(arc_tangent(hn::Mul(r, all(static_cast<float>(slope)))), all(static_cast<float>(1 / model.w)));
   return scaled(ideal, r, image, static_cast<float>(slope / model.w));
 }
 

@@ -62,7 +62,8 @@ struct LinearLens {
 
   HWY_INLINE ImageShape<3> shape(const LaneVector& mean, const std::array<LaneVector, 3>& axes, Lanes inverse) const {
     const Lanes x = hn::Mul(mean[0], inverse), y = hn::Mul(mean[1], inverse);
-    const Lanes jx = hn::Max(hn::Min(x, limit_x), hn::Neg(limit_x)), jy = hn::Max(hn::Min(y, limit_y), hn::Neg(limit_y));
+    const Lanes jx = hn::Max(hn::Min(x, limit_x), hn::Neg(limit_x)),
+                jy = hn::Max(hn::Min(y, limit_y), hn::Neg(limit_y));
     ImageShape<3> shape;
     shape.centre = {hn::MulAdd(fx, x, cx), hn::MulAdd(fy, y, cy)};
     for (std::size_t i = 0; i < 3; ++i) {
@@ -195,8 +196,7 @@ void ClusterBoxes::resize(std::size_t count) {
 }
 
 void ClusterBoxes::append(const ClusterBoxes& other, std::size_t i) {
-  for (std::size_t k = 0; k < 3; ++k)
-    middle[k].push_back(other.middle[k][i]), half[k].push_back(other.half[k][i]);
+  for (std::size_t k = 0; k < 3; ++k) middle[k].push_back(other.middle[k][i]), half[k].push_back(other.half[k][i]);
   reach.push_back(other.reach[i]);
 }
 
@@ -282,7 +282,8 @@ void Projector::project_through(const Lens& lens, const SplatGroup& group, const
     // inverse is continued linearly, which is exact on planes.
     Lanes zu = zero, zv = zero, thickness = zero;
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      zu = hn::MulAdd(axes[axis][2], shape.columns[axis].x, zu), zv = hn::MulAdd(axes[axis][2], shape.columns[axis].y, zv);
+      zu = hn::MulAdd(axes[axis][2], shape.columns[axis].x, zu),
+      zv = hn::MulAdd(axes[axis][2], shape.columns[axis].y, zv);
       thickness = hn::MulAdd(axes[axis][2], axes[axis][2], thickness);
     }
     const Lanes fall = hn::Neg(hn::Div(hn::Mul(inverse, inverse), determinant));
@@ -336,8 +337,7 @@ void Projector::project(const SplatGroup& group, const SplatCluster& cluster, co
   }
   std::visit(
       [&]<class Model>(const Model& model) {
-        project_through(UnscentedLens<Model>{model, fx, fy, cx, cy, domain_}, group, cluster, view, object,
-                        projected);
+        project_through(UnscentedLens<Model>{model, fx, fy, cx, cy, domain_}, group, cluster, view, object, projected);
       },
       camera_.distortion);
 }

@@ -24,12 +24,15 @@ struct BinPart {
 
 /// Cuts tiles at the bins.
 std::vector<BinPart> parts_of(const std::vector<Tile>& tiles, int width, int height) {
-  const int columns = (width + Compositor::kSide - 1) / Compositor::kSide, rows = (height + Compositor::kSide - 1) / Compositor::kSide;
+  const int columns = (width + Compositor::kSide - 1) / Compositor::kSide,
+            rows = (height + Compositor::kSide - 1) / Compositor::kSide;
   std::vector<int> index(static_cast<std::size_t>(columns * rows), -1);
   std::vector<BinPart> parts;
   for (const Tile& tile : tiles) {
-    for (int top = tile.y / Compositor::kSide * Compositor::kSide; top < tile.y + tile.height; top += Compositor::kSide) {
-      for (int left = tile.x / Compositor::kSide * Compositor::kSide; left < tile.x + tile.width; left += Compositor::kSide) {
+    for (int top = tile.y / Compositor::kSide * Compositor::kSide; top < tile.y + tile.height;
+         top += Compositor::kSide) {
+      for (int left = tile.x / Compositor::kSide * Compositor::kSide; left < tile.x + tile.width;
+           left += Compositor::kSide) {
         const int x0 = std::max(left, tile.x), x1 = std::min(left + Compositor::kSide, tile.x + tile.width);
         const int y0 = std::max(top, tile.y), y1 = std::min(top + Compositor::kSide, tile.y + tile.height);
         int& part = index[static_cast<std::size_t>(top / Compositor::kSide * columns + left / Compositor::kSide)];
@@ -64,7 +67,9 @@ class SplatRenderer final : public ProcessorRenderer {
     }
   }
 
-  RendererTraits traits() const override { return {.name = "splats", .granularity = Granularity::tile}; }
+  RendererTraits traits() const override {
+    return {.name = "splats", .granularity = Granularity::tile, .at_infinity = false, .has_edges = false};
+  }
 
  private:
   struct Work;
@@ -240,7 +245,8 @@ void SplatRenderer::compute(std::span<const RenderRequest> requests, Sample& sam
 void SplatRenderer::render_part(const RenderRequest& request, const RequestWork& work, const BinPart& part,
                                 ThreadWork& thread, Sample& sample) const {
   auto& [compositor, visible] = thread;
-  const int left = part.left, top = part.top, right = left + Compositor::kSide - 1, bottom = top + Compositor::kSide - 1;
+  const int left = part.left, top = part.top, right = left + Compositor::kSide - 1,
+            bottom = top + Compositor::kSide - 1;
   compositor.start(left, top);
   if (surfaces_.renderer != nullptr) {
     for (const Tile& tile : part.tiles) {
@@ -285,8 +291,8 @@ void SplatRenderer::write(const Compositor& compositor, int left, int top, const
       const float light = surfaces_.renderer != nullptr ? sample.irradiance(x, y) : options_.background;
       const float behind = pixel.transmittance * curve_.encoded(light / options_.gain);
       const auto linear = [&](std::size_t colour) { return curve_.linear(pixel.colour[colour] + behind); };
-      const float value = filters_ == ColourFilters::none ? luminance(linear(0), linear(1), linear(2))
-                                                          : linear(colour_at(x, y));
+      const float value =
+          filters_ == ColourFilters::none ? luminance(linear(0), linear(1), linear(2)) : linear(colour_at(x, y));
       sample.irradiance(x, y) = options_.gain * value;
       if (pixel.nearness > 0) {
         sample.depth(x, y) = 1 / pixel.nearness;

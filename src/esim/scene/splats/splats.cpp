@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-
 namespace esim::inline scene {
 
 Eigen::AlignedBox3d bounds(const Splats& splats) {

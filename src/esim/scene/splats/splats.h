@@ -24,9 +24,9 @@ enum class SplatLight {
 
 /// How splats are projected to the image.
 enum class SplatProjection {
-  automatic,   ///< linear without distortion, otherwise unscented
-  linear,      ///< by the Jacobian of the pinhole at the splat's centre (EWA), as the original 3D Gaussian splatting
-  unscented,   ///< by seven points of the splat, which are projected exactly through the lens, as in 3DGUT
+  automatic,  ///< linear without distortion, otherwise unscented
+  linear,     ///< by the Jacobian of the pinhole at the splat's centre (EWA), as the original 3D Gaussian splatting
+  unscented,  ///< by seven points of the splat, which are projected exactly through the lens, as in 3DGUT
 };
 
 /// The order in which splats are blended.

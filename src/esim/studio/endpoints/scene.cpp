@@ -32,6 +32,7 @@ struct DescribeKind {
   const StudioScene& scene;
   Json& answer;
   void operator()(const MeshRendererOptions&) const { answer["kind"] = "mesh"; }
+  void operator()(const SplatsRendererOptions&) const { answer["kind"] = "splats"; }
   void operator()(const PanoramaRendererOptions& panorama) const {
     const Eigen::Vector4d q = panorama.orientation.normalized();
     answer["kind"] = "panorama";

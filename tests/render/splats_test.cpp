@@ -213,10 +213,12 @@ std::vector<float> path_of(const Splats& splats, const Eigen::Vector3d& directio
 
 TEST(SplatRenderer, SplatsPassTheCameraAndTheImageWithoutSteps) {
   for (const Eigen::Vector3d& direction : {Eigen::Vector3d(0, 0, 1), Eigen::Vector3d(1, 0, 0)}) {
+    const Eigen::Vector3f position(direction.x() > 0 ? 0.3F : 0.0F, 0, 0.5F);
     for (const float opacity : {0.02F, 0.9F}) {
-      const std::vector<float> path = path_of(one_splat({0.3F, 0, 0.5F}, {0.05F, 0.07F, 0.02F}, opacity, 1), direction);
-      EXPECT_GT(*std::ranges::max_element(path), 0.5F * opacity * static_cast<float>(direction.x()));
-      for (std::size_t i = 1; i < path.size(); ++i) ASSERT_LT(std::abs(path[i] - path[i - 1]), 0.1F * opacity) << i;
+      const std::vector<float> path = path_of(one_splat(position, {0.05F, 0.07F, 0.02F}, opacity, 1), direction);
+      EXPECT_GT(*std::ranges::max_element(path), 0.5F * opacity);
+      EXPECT_LT(path.back(), 1e-6F);
+      for (std::size_t i = 1; i < path.size(); ++i) ASSERT_LT(std::abs(path[i] - path[i - 1]), 0.25F * opacity) << i;
     }
   }
 }

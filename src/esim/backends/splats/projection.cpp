@@ -171,7 +171,7 @@ Projector::Projector(const Camera& camera, SplatProjection projection, float foo
       area_(footprint * footprint),
       domain_(domain_of(camera)) {
   const PixelRays rays(camera);
-  float largest = 0, smallest = std::numeric_limits<float>::infinity();
+  float largest = 0, smallest = std::numeric_limits<float>::infinity(), widest = 0;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       Eigen::Matrix2f J;
@@ -179,9 +179,12 @@ Projector::Projector(const Camera& camera, SplatProjection projection, float foo
       const float norm = J.norm();
       largest = std::max(largest, norm), smallest = std::min(smallest, std::abs(J.determinant()) / norm);
       limit_x_ = std::max(limit_x_, std::abs(rays.x(x, y))), limit_y_ = std::max(limit_y_, std::abs(rays.y(x, y)));
+      widest = std::max(widest, std::hypot(rays.x(x, y), rays.y(x, y)));
     }
   }
   limit_x_ *= 1.3F, limit_y_ *= 1.3F;  // as in the original 3D Gaussian splatting
+  // Points of splats farther outside would make a splat next to the camera as large as the image.
+  domain_ = std::min(domain_, 1.5F * widest);
   margin_ = largest * (1 + kReach * std::sqrt(0.3F * area_));
   // The Jacobian of a bearing r by a point at depth Z is at most sqrt(1 + r²) / Z. Unscented points are nearer, and the
   // lens magnifies them by more than at the place where they are seen.

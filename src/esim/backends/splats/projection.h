@@ -83,7 +83,7 @@ class Projector {
   Camera camera_;
   bool linear_;
   float area_;                       // square of the footprint, px²
-  float domain_;                     // radius of the ideal points that the lens can show
+  float domain_;                     // radius of ideal points at which unscented points end
   float limit_x_ = 0, limit_y_ = 0;  // of the bearings at which the Jacobian of a linear projection is taken
   float reach_ = 0;                  // of a splat in the image, in standard deviations at its depth
   float margin_ = 0;                 // of the filter of the image, in bearings

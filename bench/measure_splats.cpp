@@ -1,13 +1,14 @@
 // The renderer of splats against slow double-precision code: accuracy, events and time. Usage:
-//   measure_splats FILE [--inside] [--display|--linear]
-// The camera looks along the file's z axis from 2.5 times the scene's depth away or, with --inside, along its x axis,
-// with z up, from its middle.
+//   measure_splats FILE [--inside] [--display|--linear] [--distance N]
+// The camera looks along the file's z axis from N (2.5) times the scene's depth away or, with --inside, along its x
+// axis, with z up, from its middle.
 
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
 #include <chrono>
 #include <cmath>
+#include <cstdlib>
 #include <cstring>
 #include <memory>
 #include <string>
@@ -33,10 +34,12 @@ struct Setting {
 
 Setting set_up(int count, char** arguments) {
   Setting setting;
-  if (count < 2) throw UserError("usage: measure_splats FILE [--inside] [--display|--linear]");
+  if (count < 2) throw UserError("usage: measure_splats FILE [--inside] [--display|--linear] [--distance N]");
   setting.splats = std::make_shared<Splats>(
       load_splats(arguments[1], [](const std::string& warning) { fmt::print(stderr, "{}\n", warning); }));
+  double distance = 2.5;
   for (int i = 2; i < count; ++i) {
+    if (std::strcmp(arguments[i], "--distance") == 0 && i + 1 < count) distance = std::atof(arguments[i + 1]);
     if (std::strcmp(arguments[i], "--inside") == 0) setting.inside = true;
     if (std::strcmp(arguments[i], "--linear") == 0) setting.splats->light = SplatLight::linear;
     if (std::strcmp(arguments[i], "--display") == 0) setting.splats->light = SplatLight::display;
@@ -49,7 +52,7 @@ Setting set_up(int count, char** arguments) {
     R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
     setting.start.rotation = R;
   } else {
-    setting.start.translation.z() -= 2.5 * box.sizes().z();
+    setting.start.translation.z() -= distance * box.sizes().z();
   }
   return setting;
 }

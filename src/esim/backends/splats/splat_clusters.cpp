@@ -5,43 +5,40 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <functional>
 #include <numeric>
 #include <utility>
 
 namespace esim::inline backends::inline splats {
 namespace {
 
-constexpr float kSmallest = 1e-7F;  // standard deviation that is distinguished, m
+constexpr float kSmallest = 1e-7F, kLargest = 1e6F;  // standard deviations that are distinguished, m
 
 /// Octaves between classes of size: a large splat would make a cluster of small ones visible everywhere.
 constexpr float kOctaves = 2;
 
-int size_class(const Splats& splats, std::uint32_t i) {
-  const float size = std::max(splats.deviations[i].maxCoeff(), kSmallest) / kSmallest;
-  return static_cast<int>(std::log2(size) / kOctaves);
-}
+/// A splat while they are sorted.
+struct Item {
+  Eigen::Vector3f position;
+  std::uint32_t splat;
+};
 
 /// Sorts splats so that runs of `length` are neighbours, by halving along the longest side of their box, and calls
 /// take(run) for each.
-void divide(const Splats& splats, std::span<std::uint32_t> order, std::size_t length,
-            const std::function<void(std::span<std::uint32_t>)>& take) {
-  if (order.size() <= length) return take(order);
+template <typename Take>
+void divide(std::span<Item> items, std::size_t length, const Take& take) {
+  if (items.size() <= length) return take(items);
   Eigen::AlignedBox3f box;
-  for (const std::uint32_t i : order) box.extend(splats.positions[i]);
+  for (const Item& item : items) box.extend(item.position);
   int axis = 0;
   box.sizes().maxCoeff(&axis);
-  const std::size_t runs = (order.size() + length - 1) / length, middle = runs / 2 * length;  // only the last is short
-  std::nth_element(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(middle), order.end(),
-                   [&](std::uint32_t a, std::uint32_t b) {
-                     const auto place = [&](std::uint32_t i) {
-                       const float x = splats.positions[i][axis];
-                       return std::isnan(x) ? std::pair(0.0F, i) : std::pair(x, i);
-                     };
-                     return place(a) < place(b);
+  const std::size_t runs = (items.size() + length - 1) / length, middle = runs / 2 * length;  // only the last is short
+  std::nth_element(items.begin(), items.begin() + static_cast<std::ptrdiff_t>(middle), items.end(),
+                   [&](const Item& a, const Item& b) {
+                     const float x = a.position[axis], y = b.position[axis];
+                     return x < y || (x == y && a.splat < b.splat);
                    });
-  divide(splats, order.first(middle), length, take);
-  divide(splats, order.subspan(middle), length, take);
+  divide(items.first(middle), length, take);
+  divide(items.subspan(middle), length, take);
 }
 
 /// The area of a splat's outline, up to a factor, seen from the side where it is largest.
@@ -49,19 +46,20 @@ double area_of(const Eigen::Vector3d& deviations) {
   return std::max({deviations.x() * deviations.y(), deviations.y() * deviations.z(), deviations.z() * deviations.x()});
 }
 
-/// Adds the splat that replaces `run`.
-void add_merged(const Splats& splats, std::span<const std::uint32_t> run, Splats& merged) {
+/// Sets splat `to` to the one that replaces `run`.
+void set_merged(const Splats& splats, std::span<const std::uint32_t> run, std::size_t to, Splats& merged) {
   double total = 0;
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  std::vector<double> harmonics(splats.coefficients() * 3);
+  const auto terms = static_cast<Eigen::Index>(splats.coefficients() * 3);
+  Eigen::Array<float, 48, 1> harmonics = Eigen::Array<float, 48, 1>::Zero();
   std::array<double, SplatClusters::kMerged> weights{};
   for (std::size_t k = 0; k < run.size(); ++k) {
     const std::uint32_t i = run[k];
     weights[k] = double{splats.opacities[i]} * area_of(splats.deviations[i].cast<double>()) + 1e-30;
     total += weights[k];
     mean += weights[k] * splats.positions[i].cast<double>();
-    for (std::size_t h = 0; h < harmonics.size(); ++h)
-      harmonics[h] += weights[k] * double{splats.harmonics[i * harmonics.size() + h]};
+    harmonics.head(terms) += static_cast<float>(weights[k]) *
+                             Eigen::Map<const Eigen::ArrayXf>(&splats.harmonics[i * splats.coefficients() * 3], terms);
   }
   mean /= total;
   Eigen::Matrix3d covariance = Eigen::Matrix3d::Zero();
@@ -76,48 +74,58 @@ void add_merged(const Splats& splats, std::span<const std::uint32_t> run, Splats
   const Eigen::Vector3d deviations = axes.eigenvalues().cwiseMax(0.0).cwiseSqrt();
   Eigen::Matrix3d R = axes.eigenvectors();
   if (R.determinant() < 0) R.col(0) = -R.col(0);
-  merged.positions.push_back(mean.cast<float>());
-  merged.deviations.push_back(deviations.cast<float>());
-  merged.rotations.push_back(Eigen::Quaterniond(R).coeffs().cast<float>());
-  merged.opacities.push_back(static_cast<float>(std::min(0.99, total / std::max(area_of(deviations), 1e-30))));
-  for (const double value : harmonics) merged.harmonics.push_back(static_cast<float>(value / total));
+  merged.positions[to] = mean.cast<float>();
+  merged.deviations[to] = deviations.cast<float>();
+  merged.rotations[to] = Eigen::Quaterniond(R).coeffs().cast<float>();
+  merged.opacities[to] = static_cast<float>(std::min(0.99, total / std::max(area_of(deviations), 1e-30)));
+  Eigen::Map<Eigen::ArrayXf>(&merged.harmonics[to * splats.coefficients() * 3], terms) =
+      harmonics.head(terms) / static_cast<float>(total);
 }
 
 }  // namespace
 
 SplatClusters find_clusters(const Splats& splats) {
+  std::vector<std::vector<Item>> classes;  // of size
+  for (std::uint32_t i = 0; i < splats.size(); ++i) {
+    const float size = std::clamp(splats.deviations[i].maxCoeff(), kSmallest, kLargest) / kSmallest;
+    const auto its_class = static_cast<std::size_t>(std::log2(size) / kOctaves);
+    if (classes.size() <= its_class) classes.resize(its_class + 1);
+    const Eigen::Vector3f& p = splats.positions[i];
+    classes[its_class].push_back({p.allFinite() ? p : Eigen::Vector3f::Zero(), i});
+  }
   SplatClusters clusters;
-  clusters.order.resize(splats.size());
-  std::iota(clusters.order.begin(), clusters.order.end(), 0U);
-  std::vector<int> classes(splats.size());
-  for (const std::uint32_t i : clusters.order) classes[i] = size_class(splats, i);
-  std::ranges::stable_sort(clusters.order, std::less(), [&](std::uint32_t i) { return classes[i]; });
-  for (auto begin = clusters.order.begin(); begin != clusters.order.end();) {
-    const auto end =
-        std::find_if(begin, clusters.order.end(), [&](std::uint32_t i) { return classes[i] != classes[*begin]; });
-    divide(splats, {begin, end}, SplatClusters::kMost, [&](std::span<std::uint32_t> cluster) {
-      divide(splats, cluster, SplatClusters::kMerged, [](std::span<std::uint32_t>) {});
-      clusters.ends.push_back((clusters.count() == 0 ? 0 : clusters.ends.back()) + cluster.size());
+  clusters.order.reserve(splats.size());
+  for (std::vector<Item>& items : classes) {
+    if (items.empty()) continue;
+    divide(std::span(items), SplatClusters::kMost, [&](std::span<Item> cluster) {
+      divide(cluster, SplatClusters::kMerged, [](std::span<Item>) {});
+      for (const Item& item : cluster) clusters.order.push_back(item.splat);
+      clusters.ends.push_back(clusters.order.size());
     });
-    begin = end;
+    items = {};
   }
   return clusters;
 }
 
-MergedSplats merge(const Splats& splats, const SplatClusters& clusters) {
+MergedSplats merge(const Splats& splats, const SplatClusters& clusters, const Workers& workers) {
   MergedSplats merged;
-  merged.splats.degree = splats.degree;
-  merged.splats.filter = splats.filter;
+  std::size_t count = 0;
   for (std::size_t i = 0; i < clusters.count(); ++i) {
-    const std::span<const std::uint32_t> cluster = clusters.cluster(i);
-    for (std::size_t first = 0; first < cluster.size(); first += SplatClusters::kMerged) {
-      add_merged(splats, cluster.subspan(first, std::min(SplatClusters::kMerged, cluster.size() - first)),
-                 merged.splats);
-    }
-    merged.clusters.ends.push_back(merged.splats.size());
+    count += (clusters.cluster(i).size() + SplatClusters::kMerged - 1) / SplatClusters::kMerged;
+    merged.clusters.ends.push_back(count);
   }
-  merged.clusters.order.resize(merged.splats.size());
+  merged.clusters.order.resize(count);
   std::iota(merged.clusters.order.begin(), merged.clusters.order.end(), 0U);
+  Splats& to = merged.splats;
+  to.degree = splats.degree, to.filter = splats.filter;
+  to.positions.resize(count), to.deviations.resize(count), to.rotations.resize(count), to.opacities.resize(count);
+  to.harmonics.resize(count * to.coefficients() * 3);
+  workers.for_each(static_cast<int>(clusters.count()), [&](int i) {
+    const std::span<const std::uint32_t> cluster = clusters.cluster(static_cast<std::size_t>(i));
+    std::size_t next = merged.clusters.cluster(static_cast<std::size_t>(i)).front();
+    for (std::size_t first = 0; first < cluster.size(); first += SplatClusters::kMerged)
+      set_merged(splats, cluster.subspan(first, std::min(SplatClusters::kMerged, cluster.size() - first)), next++, to);
+  });
   return merged;
 }
 

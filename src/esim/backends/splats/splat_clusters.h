@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "esim/core/parallel.h"
 #include "esim/scene/splats/splats.h"
 
 // Private to backends/splats.
@@ -32,6 +33,6 @@ struct MergedSplats {
 };
 
 /// Replaces each run by one splat with the same mean and covariance; its opacity times its area is the sum of theirs.
-MergedSplats merge(const Splats& splats, const SplatClusters& clusters);
+MergedSplats merge(const Splats& splats, const SplatClusters& clusters, const Workers& workers);
 
 }  // namespace esim::inline backends::inline splats

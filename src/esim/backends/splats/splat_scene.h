@@ -4,6 +4,7 @@
 #include <Eigen/Geometry>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "esim/backends/splats/splat_clusters.h"
@@ -23,7 +24,7 @@ struct SplatGroup {
   using Column = std::vector<float>;
 
   SplatGroup() = default;
-  SplatGroup(const Splats& splats, const SplatClusters& clusters);
+  SplatGroup(const Splats& splats, const SplatClusters& parts, const Workers& workers);
 
   std::vector<SplatRange> clusters;
 
@@ -46,7 +47,8 @@ struct SplatGroup {
   }
 
  private:
-  void set(std::size_t at, const Splats& splats, std::size_t from, float its_opacity);
+  /// Fills the arrays of a cluster; `part` lists its splats.
+  void fill(std::size_t cluster, const Splats& splats, std::span<const std::uint32_t> part);
 };
 
 class SplatScene {

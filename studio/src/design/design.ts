@@ -1,4 +1,5 @@
 import type { ScenarioDocument } from "../document/document.ts";
+import type { SceneInfo, SplatFile } from "../api/types.ts";
 import type { Place } from "../ui/place.ts";
 import { button, h, Segmented } from "../ui/dom.ts";
 import { count, shortNumber } from "../ui/format.ts";
@@ -10,6 +11,17 @@ import { DesignState } from "./state.ts";
 import { Timeline } from "./timeline.ts";
 import { Viewport } from "./viewport.ts";
 import { WaypointPanel } from "./waypoint_panel.ts";
+
+/** How much the scene contains, and how much of it the view shows. */
+function sizeOf(info: SceneInfo | null): { text: string; title: string } {
+  const sum = (of: (splats: SplatFile) => number) =>
+    (info?.objects ?? []).reduce((total, { splats }) => total + (splats ? of(splats) : 0), 0);
+  const [shown, all] = [sum((splats) => splats.shown), sum((splats) => splats.all)];
+  const parts = info?.triangles ? [`${count(info.triangles)} triangles`] : [];
+  if (all > 0) parts.push(shown < all ? `${count(shown)} of ${count(all)} splats` : `${count(all)} splats`);
+  const title = shown < all ? `The view shows the most visible ${count(shown)} of ${count(all)} splats` : "";
+  return { text: parts.join(", "), title };
+}
 
 /** The place to design the motion: the scene, waypoints, and the time line. */
 export class DesignPlace implements Place {
@@ -117,7 +129,11 @@ export class DesignPlace implements Place {
     const speed = h("span", { class: "quiet fly-speed", title: "Speed of flying (+ and -)" });
     viewport.navigation.speed_m_per_s.watch((value) => (speed.textContent = `Fly ${shortNumber(value, 2)} m/s`));
     const size = h("span", { class: "quiet triangles" });
-    state.scene.listen((info) => (size.textContent = info?.triangles ? `${count(info.triangles)} triangles` : ""));
+    state.scene.listen((info) => {
+      const { text, title } = sizeOf(info);
+      size.textContent = text;
+      size.title = title;
+    });
     return h(
       "div",
       { class: "toolbar row", attrs: { role: "toolbar", "aria-label": "View" } },

@@ -6,7 +6,6 @@
 #include <numbers>
 
 #include "esim/scene/splats/splat_file.h"
-#include "esim/scene/splats/splat_list.h"
 #include "esim/studio/scene_view/first_view.h"
 #include "support/temporary_directory.h"
 
@@ -15,13 +14,15 @@ namespace {
 
 using Eigen::Vector3f;
 
+constexpr float kHarmonic0 = 0.28209479F;
+
 /// A splat of degree 0.
 void add(Splats& splats, const Vector3f& position, const Vector3f& deviation, float opacity, float grey) {
   splats.positions.push_back(position);
   splats.deviations.push_back(deviation);
   splats.rotations.push_back(Eigen::Vector4f::UnitW());
   splats.opacities.push_back(opacity);
-  for (int i = 0; i < 3; ++i) splats.harmonics.push_back(harmonic_of_colour(grey));
+  for (int i = 0; i < 3; ++i) splats.harmonics.push_back((grey - 0.5F) / kHarmonic0);
 }
 
 Scene scene_of(Splats splats) {

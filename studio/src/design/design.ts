@@ -1,9 +1,11 @@
 import type { ScenarioDocument } from "../document/document.ts";
 import type { SceneInfo, SplatFile } from "../api/types.ts";
 import type { Place } from "../ui/place.ts";
+import { drawnBySoftware } from "../stage/gpu.ts";
 import { button, h, Segmented } from "../ui/dom.ts";
-import { count, shortNumber } from "../ui/format.ts";
+import { count, magnitude, shortNumber } from "../ui/format.ts";
 import { NumberField } from "../ui/number_field.ts";
+import { say } from "../ui/status.ts";
 import { addShortcuts } from "../ui/shortcuts.ts";
 import type { ClickMode } from "./dropping.ts";
 import { Inspector } from "./inspector.ts";
@@ -13,14 +15,16 @@ import { Viewport } from "./viewport.ts";
 import { WaypointPanel } from "./waypoint_panel.ts";
 
 /** How much the scene contains, and how much of it the view shows. */
-function sizeOf(info: SceneInfo | null): { text: string; title: string } {
+function sizeOf(info: SceneInfo | null): { text: string; cut: string; title: string } {
   const sum = (of: (splats: SplatFile) => number) =>
     (info?.objects ?? []).reduce((total, { splats }) => total + (splats ? of(splats) : 0), 0);
   const [shown, all] = [sum((splats) => splats.shown), sum((splats) => splats.all)];
-  const parts = info?.triangles ? [`${count(info.triangles)} triangles`] : [];
-  if (all > 0) parts.push(shown < all ? `${count(shown)} of ${count(all)} splats` : `${count(all)} splats`);
-  const title = shown < all ? `The view shows the most visible ${count(shown)} of ${count(all)} splats` : "";
-  return { text: parts.join(", "), title };
+  const parts: string[] = [];
+  if (all > 0) parts.push(shown < all ? `${magnitude(shown)} of ${magnitude(all)} splats` : `${count(all)} splats`);
+  if (info?.triangles) parts.push(`${count(info.triangles)} triangles`);
+  const cut = shown < all ? `The view shows ${count(shown)} of ${count(all)} splats, the most visible ones` : "";
+  const merged = all > 0 && drawnBySoftware() ? "Without a graphics card, the page merges splats to draw faster" : "";
+  return { text: parts.join(", "), cut, title: [cut, merged].filter(Boolean).join(". ") };
 }
 
 /** The place to design the motion: the scene, waypoints, and the time line. */
@@ -130,9 +134,10 @@ export class DesignPlace implements Place {
     viewport.navigation.speed_m_per_s.watch((value) => (speed.textContent = `Fly ${shortNumber(value, 2)} m/s`));
     const size = h("span", { class: "quiet triangles" });
     state.scene.listen((info) => {
-      const { text, title } = sizeOf(info);
+      const { text, cut, title } = sizeOf(info);
       size.textContent = text;
       size.title = title;
+      if (cut) say(cut);
     });
     return h(
       "div",

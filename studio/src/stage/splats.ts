@@ -1,9 +1,12 @@
 import type { SparkRenderer, SplatMesh } from "@sparkjsdev/spark";
 import { FileLoader, type Scene, type WebGLRenderer } from "three";
 import type { SplatFile } from "../api/types.ts";
+import { drawnBySoftware } from "./gpu.ts";
 
 /** Clicks pass through splats that are more transparent. */
 const min_opacity_of_surfaces = 0.4;
+/** Without a graphics card, more splats are merged to about so many for each image. */
+const max_by_software = 30_000;
 
 /** The package that draws splats. It is large, so that only scenes with splats load it. */
 const spark = () => import("@sparkjsdev/spark");
@@ -18,6 +21,7 @@ export async function loadSplats(splats: SplatFile): Promise<SplatMesh> {
     fileType: SplatFileType.SPLAT,
     extSplats: true, // positions with 32 bits
     editable: false,
+    ...(drawnBySoftware() ? { lod: true, lodAbove: max_by_software } : {}),
     minRaycastOpacity: min_opacity_of_surfaces,
   });
   return mesh.initialized;
@@ -46,7 +50,12 @@ export class SplatPainter {
     if (filter === null) return this.clear();
     const { SparkRenderer } = await spark();
     while (this.painters.length < this.views) {
-      const painter = new SparkRenderer({ renderer, enableLod: false, onDirty: this.changed });
+      const painter = new SparkRenderer({
+        renderer,
+        enableLod: drawnBySoftware(),
+        lodSplatCount: max_by_software,
+        onDirty: this.changed,
+      });
       painter.visible = false;
       this.painters.push(painter);
       this.scene.add(painter);
@@ -62,10 +71,16 @@ export class SplatPainter {
   private clear(): void {
     for (const painter of this.painters) {
       this.scene.remove(painter);
-      painter.geometry.dispose();
-      painter.material.dispose();
-      painter.dispose();
+      disposeAtRest(painter);
     }
     this.painters = [];
   }
+}
+
+/** Disposes when no sorting is in progress: it would fail. */
+function disposeAtRest(painter: SparkRenderer): void {
+  if (painter.sorting) return void setTimeout(() => disposeAtRest(painter), 100);
+  painter.geometry.dispose();
+  painter.material.dispose();
+  painter.dispose();
 }

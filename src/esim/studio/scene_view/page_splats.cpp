@@ -5,12 +5,11 @@
 #include <cstdint>
 #include <functional>
 
-#include "esim/scene/splats/splat_list.h"
-
 namespace esim::studio {
 namespace {
 
 constexpr float kWhite = 255;
+constexpr float kHarmonic0 = 0.28209479F;  // of degree 0: sqrt(1 / 4π)
 constexpr std::size_t kSplatBytes = 32;
 constexpr double kOutermost = 0.01;
 

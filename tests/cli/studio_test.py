@@ -260,6 +260,7 @@ class Answers(StudioTest):
         yaml = new["yaml"].replace("  scene: row.splat\n", "  scene: row.splat\n" + objects)
         scene = self.ask("POST", "/api/scene", {"yaml": yaml, "dir": "work"})
         self.assertEqual((scene["kind"], scene["triangles"], scene["bounds"]), ("splats", 1, [[0, 4, 6], [6, 4, 6]]))
+        self.assertEqual(scene["middle"], scene["bounds"])
         still, few, tile = scene["objects"]
         self.assertEqual((still["moving"], few["moving"], tile["splats"]), (False, True, None))
         self.assertEqual({k: v for k, v in still["splats"].items() if k != "file"}, {"shown": 4, "all": 4, "filter": "dilated"})

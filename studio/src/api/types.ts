@@ -82,6 +82,8 @@ export interface SceneInfo {
   triangles: number;
   /** Of the static objects; null without static objects. */
   bounds: [[number, number, number], [number, number, number]] | null;
+  /** Of the static splats, without outliers. */
+  middle?: [[number, number, number], [number, number, number]] | null;
   /** Of the rig; look_at of waypoints refers to the first. */
   cameras: [CameraModel, ...CameraModel[]];
   objects: { name: string; glb_node: string; moving: boolean; splats: SplatFile | null }[];

@@ -36,6 +36,7 @@ async function frames(count: number): Promise<void> {
 /** The content of the scene, as the server describes it. */
 export class SceneContent {
   readonly group = new Group();
+  /** Without outliers. */
   readonly bounds = new Box3();
   private nodes: (Object3D | null)[] = [];
   private key = "";
@@ -71,7 +72,8 @@ export class SceneContent {
     this.nodes = info.objects.map((object, i) => splats[i] ?? made.group.getObjectByName(object.glb_node) ?? null);
     this.group.updateMatrixWorld(true);
     this.bounds.makeEmpty();
-    if (info.bounds) this.bounds.set(new Vector3(...info.bounds[0]), new Vector3(...info.bounds[1]));
+    const box = info.middle ?? info.bounds;
+    if (box) this.bounds.set(new Vector3(...box[0]), new Vector3(...box[1]));
     if (made.small.length > 0) void this.sharpen(made);
     return true;
   }

@@ -16,6 +16,11 @@ namespace {
 constexpr const char* kForgotten = "this scene is no longer loaded; reload the page";
 constexpr const char* kKept = "private, max-age=3600";
 
+Json box_json(const Eigen::AlignedBox3d& box) {
+  if (box.isEmpty()) return nullptr;
+  return {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
+}
+
 Json bounds_of(const StudioScene& scene) {
   Eigen::AlignedBox3d still, all;
   for (std::size_t i = 0; i < scene.file().scene.objects.size(); ++i) {
@@ -26,9 +31,16 @@ Json bounds_of(const StudioScene& scene) {
     all.extend(box);
     if (!object.moves) still.extend(box);
   }
-  const Eigen::AlignedBox3d& box = still.isEmpty() ? all : still;
-  if (box.isEmpty()) return nullptr;
-  return {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
+  return box_json(still.isEmpty() ? all : still);
+}
+
+/// The box around the static splats without outliers, which are far away in many captures; empty without static splats.
+Eigen::AlignedBox3d middle_of(const StudioScene& scene) {
+  Eigen::AlignedBox3d box;
+  for (std::size_t i = 0; i < scene.splats().size(); ++i) {
+    if (scene.splats()[i] && !scene.file().scene.objects[i].moves) box.extend(scene.splats()[i]->middle);
+  }
+  return box;
 }
 
 /// Sets the kind of scene, and the pose of a panorama or a plane in the world.
@@ -52,7 +64,7 @@ struct DescribeKind {
     for (const double x : {-0.5, 0.5}) {
       for (const double y : {-0.5, 0.5}) box.extend(pose * Eigen::Vector3d(x * plane.width_m, y * height_m, 0));
     }
-    answer["bounds"] = {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
+    answer["bounds"] = box_json(box);
   }
   void operator()(const auto&) const { answer["kind"] = "sprites"; }  // the page shows only the simulator's images
 };
@@ -83,11 +95,8 @@ Json engine_json(const Scenario& scenario) {
 SE3 start_of(const StudioScene& scene) {
   const SceneFile& file = scene.file();
   if (!file.cameras.empty()) return file.cameras.front().motion.front().T_world_object;
-  const auto has_still_splats = [&](std::size_t i) { return scene.splats()[i] && !file.scene.objects[i].moves; };
-  for (std::size_t i = 0; i < scene.splats().size(); ++i) {
-    if (has_still_splats(i)) return first_view_of_splats(scene.splats()[i]->middle);
-  }
-  return first_view(file.scene);
+  const Eigen::AlignedBox3d splats = middle_of(scene);
+  return splats.isEmpty() ? first_view(file.scene) : first_view_of_splats(splats);
 }
 
 Json splats_json(const std::optional<PageSplats>& splats, const std::string& address) {
@@ -106,7 +115,8 @@ Json scene_json(const Scenario& scenario, SceneStore& scenes) {
               {"glb", scene->glb() ? Json(base + ".glb") : Json()},
               {"texture", scene->texture() ? Json(base + ".jpg") : Json()},
               {"triangles", scene->triangles()},
-              {"bounds", bounds_of(*scene)}};
+              {"bounds", bounds_of(*scene)},
+              {"middle", box_json(middle_of(*scene))}};
   std::visit(DescribeKind{*scene, answer}, scenario.renderer);
   answer["cameras"] = cameras_json(cameras_of(scenario, scene->file()));
   answer["start"] = json_of(start_of(*scene));

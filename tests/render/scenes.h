@@ -13,6 +13,7 @@
 #include "esim/backends/plane/plane_renderer.h"
 #include "esim/backends/raycast/raster/raster_renderer.h"
 #include "esim/backends/raycast/raycast_renderer.h"
+#include "esim/backends/splats/splat_renderer.h"
 #include "esim/backends/sprites/sprites_renderer.h"
 #include "esim/geometry/so3.h"
 #include "esim/motion/trajectory.h"
@@ -26,14 +27,15 @@ inline const Workers& two_threads() {
 }
 
 /// A smooth texture: low spatial frequencies, so that filtering hardly changes it.
+inline float smooth_light(double u, double v) {
+  return static_cast<float>(0.5 + 0.2 * std::sin(2 * std::numbers::pi * 3 * u) +
+                            0.2 * std::cos(2 * std::numbers::pi * 2 * v));
+}
+
 inline Image<float> smooth_image(int width, int height) {
   Image<float> image(width, height);
   for (int y = 0; y < height; ++y) {
-    for (int x = 0; x < width; ++x) {
-      const double u = (x + 0.5) / width, v = (y + 0.5) / height;
-      image(x, y) = static_cast<float>(0.5 + 0.2 * std::sin(2 * std::numbers::pi * 3 * u) +
-                                       0.2 * std::cos(2 * std::numbers::pi * 2 * v));
-    }
+    for (int x = 0; x < width; ++x) image(x, y) = smooth_light((x + 0.5) / width, (y + 0.5) / height);
   }
   return image;
 }
@@ -139,6 +141,49 @@ inline Scene plain_moving_scene() {
   return scene;
 }
 
+/// The surfaces of a mesh with smooth_texture(), covered with flat splats on a lattice, at most `spacing` apart.
+inline Splats splats_of(const Mesh& mesh, float spacing) {
+  Splats splats;
+  splats.light = SplatLight::linear;
+  splats.filter = SplatFilter::antialiased;
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i) {
+    const auto corner = [&](std::size_t k) { return mesh.vertices[mesh.triangles[i][k]]; };
+    const Eigen::Vector3f a = corner(1) - corner(0), b = corner(2) - corner(0);
+    Eigen::Matrix3f R;
+    R.col(0) = a.normalized(), R.col(2) = a.cross(b).normalized(), R.col(1) = R.col(2).cross(R.col(0));
+    const Eigen::Quaternionf q(R);
+    const int n = static_cast<int>(std::ceil(std::max(a.norm(), b.norm()) / spacing));
+    for (int v = 0; v < n; ++v) {
+      for (int u = 0; u < n - v; ++u) {
+        const float x = (static_cast<float>(u) + 1.0F / 3) / static_cast<float>(n);
+        const float y = (static_cast<float>(v) + 1.0F / 3) / static_cast<float>(n);
+        const auto& uv = mesh.texture_uv[i];
+        const Eigen::Vector2f at = uv[0] + x * (uv[1] - uv[0]) + y * (uv[2] - uv[0]);
+        const float light = smooth_light(double{at.x()}, double{at.y()});
+        splats.positions.push_back(corner(0) + x * a + y * b);
+        splats.deviations.emplace_back(0.6F * a.norm() / static_cast<float>(n), 0.6F * b.norm() / static_cast<float>(n),
+                                       0.0F);
+        splats.rotations.push_back(q.coeffs());
+        splats.opacities.push_back(0.98F);
+        for (int colour = 0; colour < 3; ++colour) splats.harmonics.push_back((light - 0.5F) / 0.28209479F);
+      }
+    }
+  }
+  return splats;
+}
+
+/// moving_scene() of splats.
+inline std::shared_ptr<const SplatScene> splat_scene(bool moving) {
+  const auto make = [](float scale) {
+    Mesh mesh = box_mesh();
+    for (Eigen::Vector3f& vertex : mesh.vertices) vertex *= scale;
+    return std::make_shared<const Splats>(splats_of(mesh, scale < 1 ? 0.008F : 0.05F));
+  };
+  std::vector<SplatObject> objects{{make(1)}};
+  if (moving) objects.insert(objects.end(), {{make(0.15F), 0}, {make(0.2F), 1}});
+  return build_splat_scene(objects);
+}
+
 /// Their motion, with constant twists, in front of the moving camera.
 inline std::vector<Kinematics> moving_objects(double t_s) {
   Kinematics left, right;
@@ -161,8 +206,8 @@ inline bool has_gl() { return !gl_devices().empty(); }
 /// The renderers that make_renderer() makes: those of a 3D scene, and those that draw on the sensor. "moving": two
 /// objects move; "blurred": the lens blurs.
 inline constexpr std::array kRenderersOfSpace = {
-    "panorama",      "plane", "mesh",      "moving_mesh",      "raster",
-    "moving_raster", "gl",    "moving_gl", "blurred_panorama", "moving_blurred_raster"};
+    "panorama", "plane",     "mesh",   "moving_mesh",   "raster",           "moving_raster",
+    "gl",       "moving_gl", "splats", "moving_splats", "blurred_panorama", "moving_blurred_raster"};
 inline constexpr std::array kRenderersOnSensor = {"sprites", "blurred_sprites"};
 
 /// Every renderer on a scene that fills the view from near the origin. Those of `gl` and `sprites` ignore `area`.
@@ -180,6 +225,10 @@ inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Ca
   }
   if (name == "plane") return make_plane_renderer(test_plane(), camera, workers, kNone, area.texture);
   if (name == "sprites") return make_sprites_renderer(test_sprites(), camera, workers);
+  if (name.ends_with("splats")) {
+    static const auto still = splat_scene(false), moving = splat_scene(true);
+    return make_splat_renderer(name == "splats" ? still : moving, {}, camera, workers, kNone, area.texture);
+  }
   const Scene scene = name.starts_with("moving") ? moving_scene() : still_scene(box_mesh());
   if (name.ends_with("gl")) return make_gl_renderer(scene, {}, camera);
   if (name.ends_with("raster"))

@@ -47,6 +47,12 @@ Splats splats_of(const std::filesystem::path& path, double scale, const SplatsRe
   if (options.filter) splats.filter = *options.filter;
   if (options.light) splats.light = *options.light;
   notices.note(fmt::format("scene {}: {}", path.filename().string(), summary(splats)));
+  if (const double white = share_at_white(splats); white > 0.001) {
+    notices.note(
+        fmt::format("scene {}: {:.1f} % of its surface is at the display's white; how bright it was is lost, so that "
+                    "contrasts there are too low",
+                    path.filename().string(), 100 * white));
+  }
   return splats;
 }
 

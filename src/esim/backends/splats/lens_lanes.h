@@ -62,7 +62,7 @@ HWY_INLINE LanePoints distorted(const Fov& model, LanePoints ideal) {
   return scaled(ideal, r, image, static_cast<float>(slope / model.w));
 }
 
-/// Moves points outside the disc in which a lens is invertible onto its edge.
+/// Moves points outside a disc onto its edge.
 HWY_INLINE LanePoints inside(LanePoints ideal, float radius) {
   const Lanes r = radius_of(ideal);
   const Lanes scale = hn::Div(all(radius), hn::Max(r, all(radius)));

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "esim/backends/splats/splat_scene.h"
+#include "esim/backends/splats/splat_clusters.h"
 
 // Private to backends/splats.
 namespace esim::inline backends::inline splats {
@@ -26,7 +26,7 @@ struct alignas(64) ScreenSplat {
 /// The splats of a cluster in the image, and the pixels in which each may be visible: columns from left to right and
 /// rows from top to bottom, none if left > right.
 struct ProjectedCluster {
-  static constexpr std::size_t kMost = SplatCluster::kMost;
+  static constexpr std::size_t kMost = SplatClusters::kMost;
   std::array<ScreenSplat, kMost> splats;
   alignas(64) std::array<std::int16_t, kMost> left, right, top, bottom;
 

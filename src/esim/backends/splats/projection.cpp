@@ -18,6 +18,9 @@ namespace {
 
 constexpr float kHuge = 32000;  // px; limit of rectangles
 
+// Standard deviations of merged splats, px, up to which they are used alone, and from which the fine ones are
+constexpr float kMergedAlone = 0.15F, kFineAlone = 0.2F;
+
 /// Radius of the disc of ideal points that the lens can show.
 float domain_of(const Camera& camera) {
   constexpr double kMost = 1e3;
@@ -171,7 +174,7 @@ Projector::Projector(const Camera& camera, SplatProjection projection, float foo
       area_(footprint * footprint),
       domain_(domain_of(camera)) {
   const PixelRays rays(camera);
-  float largest = 0, smallest = std::numeric_limits<float>::infinity();
+  float largest = 0, smallest = std::numeric_limits<float>::infinity(), widest = 0;
   for (int y = 0; y < camera.height; ++y) {
     for (int x = 0; x < camera.width; ++x) {
       Eigen::Matrix2f J;
@@ -179,9 +182,13 @@ Projector::Projector(const Camera& camera, SplatProjection projection, float foo
       const float norm = J.norm();
       largest = std::max(largest, norm), smallest = std::min(smallest, std::abs(J.determinant()) / norm);
       limit_x_ = std::max(limit_x_, std::abs(rays.x(x, y))), limit_y_ = std::max(limit_y_, std::abs(rays.y(x, y)));
+      widest = std::max(widest, std::hypot(rays.x(x, y), rays.y(x, y)));
     }
   }
   limit_x_ *= 1.3F, limit_y_ *= 1.3F;  // as in the original 3D Gaussian splatting
+  // Points of splats farther outside would make a splat next to the camera as large as the image.
+  domain_ = std::min(domain_, 1.5F * widest);
+  px_per_bearing_ = 1 / (smallest * footprint);
   margin_ = largest * (1 + kReach * std::sqrt(0.3F * area_));
   // The Jacobian of a bearing r by a point at depth Z is at most sqrt(1 + r²) / Z. Unscented points are nearer, and the
   // lens magnifies them by more than at the place where they are seen.
@@ -192,12 +199,12 @@ void ClusterBoxes::resize(std::size_t count) {
   for (auto* of_axes : {&middle, &half}) {
     for (std::vector<float>& values : *of_axes) values.resize(count);
   }
-  reach.resize(count);
+  reach.resize(count), fine.resize(count);
 }
 
 void ClusterBoxes::append(const ClusterBoxes& other, std::size_t i) {
   for (std::size_t k = 0; k < 3; ++k) middle[k].push_back(other.middle[k][i]), half[k].push_back(other.half[k][i]);
-  reach.push_back(other.reach[i]);
+  reach.push_back(other.reach[i]), fine.push_back(other.fine[i]);
 }
 
 void ClusterBoxes::find_visible(const BearingRect& rect, std::vector<std::uint8_t>& visible) const {
@@ -218,27 +225,41 @@ void ClusterBoxes::find_visible(const BearingRect& rect, std::vector<std::uint8_
   }
 }
 
-void Projector::find_boxes(const SplatGroup& group, const SplatView& view, ClusterBoxes& boxes) const {
-  boxes.resize(group.clusters.size());
+void Projector::find_boxes(const SplatScene::Placed& group, const SplatView& view, ClusterBoxes& boxes) const {
+  const std::size_t count = group.fine.clusters.size();
+  boxes.resize(count);
+  const float *mx = group.fine.box_middle[0].data(), *my = group.fine.box_middle[1].data(),
+              *mz = group.fine.box_middle[2].data();
+  const float *hx = group.fine.box_half[0].data(), *hy = group.fine.box_half[1].data(),
+              *hz = group.fine.box_half[2].data();
+  const float cx = view.position.x(), cy = view.position.y(), cz = view.position.z();
   for (int row = 0; row < 3; ++row) {
-    const auto k = static_cast<std::size_t>(row);
     const float rx = view.R_camera_group(row, 0), ry = view.R_camera_group(row, 1), rz = view.R_camera_group(row, 2);
-    const float cx = view.position.x(), cy = view.position.y(), cz = view.position.z();
-    const float *mx = group.box_middle[0].data(), *my = group.box_middle[1].data(), *mz = group.box_middle[2].data();
-    const float *hx = group.box_half[0].data(), *hy = group.box_half[1].data(), *hz = group.box_half[2].data();
-    float *middle = boxes.middle[k].data(), *half = boxes.half[k].data();
+    float* const middle = boxes.middle[static_cast<std::size_t>(row)].data();
+    float* const half = boxes.half[static_cast<std::size_t>(row)].data();
 #pragma omp simd
-    for (std::size_t i = 0; i < boxes.size(); ++i) {
+    for (std::size_t i = 0; i < count; ++i) {
       middle[i] = rx * (mx[i] - cx) + ry * (my[i] - cy) + rz * (mz[i] - cz);
       half[i] = std::abs(rx) * hx[i] + std::abs(ry) * hy[i] + std::abs(rz) * hz[i];
     }
   }
-  for (std::size_t i = 0; i < boxes.size(); ++i) boxes.reach[i] = reach_ * group.largest_deviation[i];
+  // By the distance from the camera to the ball around the box, so that turning the camera changes nothing
+  const float *fine = group.fine.largest_deviation.data(), *merged = group.merged.largest_deviation.data();
+  float *reach = boxes.reach.data(), *share = boxes.fine.data();
+#pragma omp simd
+  for (std::size_t i = 0; i < count; ++i) {
+    const float x = mx[i] - cx, y = my[i] - cy, z = mz[i] - cz;
+    const float radius = std::sqrt(hx[i] * hx[i] + hy[i] * hy[i] + hz[i] * hz[i]);
+    const float distance = std::max(std::sqrt(x * x + y * y + z * z) - radius, kNearest);
+    const float size = px_per_bearing_ * merged[i] / distance;
+    share[i] = std::min(std::max((size - kMergedAlone) * (1 / (kFineAlone - kMergedAlone)), 0.0F), 1.0F);
+    reach[i] = reach_ * (share[i] < 1 ? std::max(fine[i], merged[i]) : fine[i]);
+  }
 }
 
 template <class Lens>
-void Projector::project_through(const Lens& lens, const SplatGroup& group, const SplatCluster& cluster,
-                                const SplatView& view, float object, ProjectedCluster& projected) const {
+void Projector::project_through(const Lens& lens, const SplatGroup& group, const SplatRange& cluster,
+                                const SplatView& view, float share, float object, ProjectedCluster& projected) const {
   constexpr float kLog2E = std::numbers::log2e_v<float>;
   const Lanes variance = all(variance_of(group.filter) * area_), one = all(1), zero = hn::Zero(kTag);
   const bool compensated = group.filter != SplatFilter::dilated;
@@ -260,6 +281,10 @@ void Projector::project_through(const Lens& lens, const SplatGroup& group, const
     // Opacity; next to the camera, it falls to 0.
     const Lanes z = hn::Max(mean[2], all(kNearest)), inverse = hn::Div(one, z);
     Lanes opacity = load(group.opacity);
+    if (share < 1) {
+      const Lanes clear = hn::Max(hn::Sub(one, opacity), all(1e-6F));
+      opacity = hn::Max(hn::Sub(one, exp2_of(hn::Mul(all(share), log2_of(clear)))), zero);
+    }
     opacity = hn::Mul(opacity, hn::Max(zero, hn::Min(one, hn::MulSub(mean[2], all(1 / kNearest), one))));
 
     // The Gaussian in the image
@@ -327,17 +352,18 @@ void Projector::project_through(const Lens& lens, const SplatGroup& group, const
   projected.set_bounds(cluster.count);
 }
 
-void Projector::project(const SplatGroup& group, const SplatCluster& cluster, const SplatView& view, float object,
-                        ProjectedCluster& projected) const {
+void Projector::project(const SplatGroup& group, const SplatRange& cluster, const SplatView& view, float share,
+                        float object, ProjectedCluster& projected) const {
   const Lanes fx = all(static_cast<float>(camera_.fx)), fy = all(static_cast<float>(camera_.fy));
   const Lanes cx = all(static_cast<float>(camera_.cx)), cy = all(static_cast<float>(camera_.cy));
   if (linear_) {
-    return project_through(LinearLens{fx, fy, cx, cy, all(limit_x_), all(limit_y_)}, group, cluster, view, object,
-                           projected);
+    return project_through(LinearLens{fx, fy, cx, cy, all(limit_x_), all(limit_y_)}, group, cluster, view, share,
+                           object, projected);
   }
   std::visit(
       [&]<class Model>(const Model& model) {
-        project_through(UnscentedLens<Model>{model, fx, fy, cx, cy, domain_}, group, cluster, view, object, projected);
+        project_through(UnscentedLens<Model>{model, fx, fy, cx, cy, domain_}, group, cluster, view, share, object,
+                        projected);
       },
       camera_.distortion);
 }

@@ -44,10 +44,11 @@ struct BearingRect {
   }
 };
 
-/// Boxes around the centres of clusters in the camera frame, and how far splats reach beyond them, per cluster; m.
+/// Per cluster, in m: a box around the centres in the camera frame, and how far splats reach beyond it; and the share
+/// of the fine splats, as opposed to merged ones.
 struct ClusterBoxes {
   std::array<std::vector<float>, 3> middle, half;
-  std::vector<float> reach;
+  std::vector<float> reach, fine;
 
   std::size_t size() const { return reach.size(); }
   void resize(std::size_t count);
@@ -63,30 +64,33 @@ class Projector {
   /// `footprint`: side of the square that pixels average over, px.
   Projector(const Camera& camera, SplatProjection projection, float footprint);
 
-  /// The boxes of all clusters of a group.
-  void find_boxes(const SplatGroup& group, const SplatView& view, ClusterBoxes& boxes) const;
+  /// The boxes of all clusters. Where merged splats are smaller than a pixel's filter, they replace the fine ones; the
+  /// change is gradual.
+  void find_boxes(const SplatScene::Placed& group, const SplatView& view, ClusterBoxes& boxes) const;
 
   /// The bearings at which a splat may be visible that is seen in the rectangle, because of the filter of the image.
   BearingRect widened(const BearingRect& rect) const {
     return {rect.left - margin_, rect.right + margin_, rect.top - margin_, rect.bottom + margin_};
   }
 
-  /// Projects the splats of a cluster. `object` as in ScreenSplat.
-  void project(const SplatGroup& group, const SplatCluster& cluster, const SplatView& view, float object,
+  /// Projects the splats of a cluster, with a share of their opacity: 1 - (1 - opacity)^share. `object` as in
+  /// ScreenSplat.
+  void project(const SplatGroup& group, const SplatRange& cluster, const SplatView& view, float share, float object,
                ProjectedCluster& projected) const;
 
  private:
   template <class Lens>
-  void project_through(const Lens& lens, const SplatGroup& group, const SplatCluster& cluster, const SplatView& view,
-                       float object, ProjectedCluster& projected) const;
+  void project_through(const Lens& lens, const SplatGroup& group, const SplatRange& cluster, const SplatView& view,
+                       float share, float object, ProjectedCluster& projected) const;
 
   Camera camera_;
   bool linear_;
   float area_;                       // square of the footprint, px²
-  float domain_;                     // radius of the ideal points that the lens can show
+  float domain_;                     // radius of ideal points at which unscented points end
   float limit_x_ = 0, limit_y_ = 0;  // of the bearings at which the Jacobian of a linear projection is taken
   float reach_ = 0;                  // of a splat in the image, in standard deviations at its depth
   float margin_ = 0;                 // of the filter of the image, in bearings
+  float px_per_bearing_ = 0;         // at most; pixels of the sensor
 };
 
 }  // namespace esim::inline backends::inline splats

@@ -47,6 +47,8 @@ std::vector<BinPart> parts_of(const std::vector<Tile>& tiles, int width, int hei
 /// A cluster that may be visible in a request.
 struct SeenCluster {
   std::size_t group, cluster;
+  bool fine;    // or merged
+  float share;  // of the opacity
 };
 
 class SplatRenderer final : public ProcessorRenderer {
@@ -164,13 +166,14 @@ void SplatRenderer::collect(const RenderRequest& request, RequestWork& work) con
   BearingRect whole = bearings(work.parts.front());
   for (const BinPart& part : work.parts) whole = whole.with(bearings(part));
   for (std::size_t g = 0; g < scene_->groups.size(); ++g) {
-    const auto& [group, object, to_object] = scene_->groups[g];
-    projector_.find_boxes(group, work.views.emplace_back(request, object, to_object), work.boxes);
+    const SplatScene::Placed& group = scene_->groups[g];
+    projector_.find_boxes(group, work.views.emplace_back(request, group.object, group.to_object), work.boxes);
     work.boxes.find_visible(whole, work.visible);
     for (std::size_t c = 0; c < work.visible.size(); ++c) {
       if (work.visible[c] == 0) continue;
-      work.seen.push_back({g, c});
-      work.seen_boxes.append(work.boxes, c);
+      const float share = work.boxes.fine[c];
+      if (share > 0) work.seen.push_back({g, c, true, share}), work.seen_boxes.append(work.boxes, c);
+      if (share < 1) work.seen.push_back({g, c, false, 1 - share}), work.seen_boxes.append(work.boxes, c);
     }
   }
   constexpr std::size_t kFewParts = 16;  // whose rectangle may be much larger than they are
@@ -228,9 +231,10 @@ void SplatRenderer::compute(std::span<const RenderRequest> requests, Sample& sam
     for (std::size_t i = first; i < std::min(first + kClustersAtOnce, clusters.size()); ++i) {
       const auto& [r, k] = clusters[i];
       const SeenCluster& seen = work->requests[r].seen[k];
-      const auto& [group, object, to_object] = scene_->groups[seen.group];
-      projector_.project(group, group.clusters[seen.cluster], work->requests[r].views[seen.group],
-                         static_cast<float>(object), work->projected[i]);
+      const SplatScene::Placed& placed = scene_->groups[seen.group];
+      const SplatGroup& group = seen.fine ? placed.fine : placed.merged;
+      projector_.project(group, group.clusters[seen.cluster], work->requests[r].views[seen.group], seen.share,
+                         static_cast<float>(placed.object), work->projected[i]);
     }
   });
 

@@ -6,26 +6,26 @@
 #include <cstdint>
 #include <vector>
 
+#include "esim/backends/splats/splat_clusters.h"
 #include "esim/backends/splats/splat_renderer.h"
 
 // Private to backends/splats.
 namespace esim::inline backends::inline splats {
 
-/// Neighbouring splats of similar size, which are culled and projected together.
-struct SplatCluster {
-  static constexpr std::size_t kMost = 128;
-
-  std::uint32_t first, count;  ///< of SplatGroup's arrays; both are multiples of 8
+/// The place of a cluster's splats in the arrays of a SplatGroup; multiples of 8.
+struct SplatRange {
+  std::uint32_t first, count;
 };
 
-/// The splats of an object, in clusters. Arrays have an entry per splat; the ends of clusters are filled with splats of
-/// opacity 0.
+/// The splats of an object, in clusters that are culled and projected together. Arrays have an entry per splat; the
+/// ends of clusters are filled with splats of opacity 0.
 struct SplatGroup {
   using Column = std::vector<float>;
 
-  explicit SplatGroup(const Splats& splats);
+  SplatGroup() = default;
+  SplatGroup(const Splats& splats, const SplatClusters& clusters);
 
-  std::vector<SplatCluster> clusters;
+  std::vector<SplatRange> clusters;
 
   /// Per cluster: the box around the centres (its middle and half of its sides), and the largest standard deviation; m.
   std::array<Column, 3> box_middle, box_half;
@@ -44,6 +44,9 @@ struct SplatGroup {
   const std::uint16_t* harmonic(std::size_t coefficient, std::size_t colour_index) const {
     return harmonics.data() + ((coefficient - 1) * 3 + colour_index) * size;
   }
+
+ private:
+  void set(std::size_t at, const Splats& splats, std::size_t from, float its_opacity);
 };
 
 class SplatScene {
@@ -51,7 +54,8 @@ class SplatScene {
   explicit SplatScene(const std::vector<SplatObject>& objects);
 
   struct Placed {
-    SplatGroup group;
+    SplatGroup fine;
+    SplatGroup merged;       ///< the same clusters of fewer splats, for clusters that are far away
     std::size_t object = 0;  ///< 0: static; i + 1: the i-th moving object of requests
     Eigen::Quaterniond to_object{};
   };

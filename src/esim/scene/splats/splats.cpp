@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "esim/scene/splats/splat_list.h"
+
 namespace esim::inline scene {
 
 Eigen::AlignedBox3d bounds(const Splats& splats) {
@@ -9,6 +13,21 @@ Eigen::AlignedBox3d bounds(const Splats& splats) {
   const Eigen::Matrix3d R = splats.to_object.toRotationMatrix();
   for (const Eigen::Vector3f& position : splats.positions) box.extend(R * position.cast<double>());
   return box;
+}
+
+double share_at_white(const Splats& splats) {
+  if (splats.light == SplatLight::linear) return 0;
+  double white = 0, all = 0;
+  for (std::size_t i = 0; i < splats.size(); ++i) {
+    const Eigen::Vector3d d = splats.deviations[i].cast<double>();
+    const double area = std::max({d.x() * d.y(), d.y() * d.z(), d.z() * d.x()});
+    const double weight = double{splats.opacities[i]} * area;
+    const float* const harmonics = &splats.harmonics[i * splats.coefficients() * 3];
+    const float brightest = 0.5F + kHarmonic0 * std::max({harmonics[0], harmonics[1], harmonics[2]});
+    all += weight;
+    if (brightest >= 0.98F) white += weight;
+  }
+  return all > 0 ? white / all : 0;
 }
 
 std::string summary(const Splats& splats) {

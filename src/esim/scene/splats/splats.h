@@ -63,6 +63,10 @@ struct Splats {
 /// The box around the centres, in the object's coordinates.
 Eigen::AlignedBox3d bounds(const Splats& splats);
 
+/// The share of the splats, weighted by opacity and area, with a colour at the display's white: 0.98 or above. The
+/// light there was brighter by an unknown factor. 0 for SplatLight::linear.
+double share_at_white(const Splats& splats);
+
 /// A summary in one line: number, degree, light, filter, and size.
 std::string summary(const Splats& splats);
 

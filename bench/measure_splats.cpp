@@ -1,0 +1,230 @@
+// The renderer of splats against slow double-precision code: accuracy, events and time. Usage:
+//   measure_splats FILE [--inside] [--display|--linear] [--distance N]
+// The camera looks along the file's z axis from N (2.5) times the scene's depth away or, with --inside, along its x
+// axis, with z up, from its middle.
+
+#include <fmt/format.h>
+
+#include <Eigen/Geometry>
+#include <chrono>
+#include <cmath>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "esim/backends/splats/splat_renderer.h"
+#include "esim/core/error.h"
+#include "esim/core/parallel.h"
+#include "esim/geometry/so3.h"
+#include "esim/scene/splats/splat_file.h"
+#include "render/splat_reference.h"
+
+namespace esim {
+namespace {
+
+using Rules = test::SplatRules;
+
+struct Setting {
+  std::shared_ptr<Splats> splats;
+  bool inside = false;
+  SE3 start;  // of the camera in the scene
+};
+
+Setting set_up(int count, char** arguments) {
+  Setting setting;
+  if (count < 2) throw UserError("usage: measure_splats FILE [--inside] [--display|--linear] [--distance N]");
+  setting.splats = std::make_shared<Splats>(
+      load_splats(arguments[1], [](const std::string& warning) { fmt::print(stderr, "{}\n", warning); }));
+  double distance = 2.5;
+  for (int i = 2; i < count; ++i) {
+    if (std::strcmp(arguments[i], "--distance") == 0 && i + 1 < count) distance = std::atof(arguments[i + 1]);
+    if (std::strcmp(arguments[i], "--inside") == 0) setting.inside = true;
+    if (std::strcmp(arguments[i], "--linear") == 0) setting.splats->light = SplatLight::linear;
+    if (std::strcmp(arguments[i], "--display") == 0) setting.splats->light = SplatLight::display;
+  }
+  fmt::print("{}: {}\n", arguments[1], summary(*setting.splats));
+  const Eigen::AlignedBox3d box = bounds(*setting.splats);
+  setting.start.translation = box.center();
+  if (setting.inside) {
+    Eigen::Matrix3d R;
+    R << 0, 0, 1, -1, 0, 0, 0, -1, 0;
+    setting.start.rotation = R;
+  } else {
+    setting.start.translation.z() -= distance * box.sizes().z();
+  }
+  return setting;
+}
+
+/// A camera that translates by 0.5 m/s and turns by about 13 deg/s, `t` seconds after the start.
+Kinematics moved(const Setting& setting, double t) {
+  Kinematics camera;
+  camera.T_world_body.rotation = setting.start.rotation * so3_exp(Eigen::Vector3d(0.1, -0.2, 0.05) * t);
+  camera.T_world_body.translation =
+      setting.start.translation + setting.start.rotation * Eigen::Vector3d(0.45, 0, 0.2) * t;
+  return camera;
+}
+
+std::unique_ptr<Renderer> make(const Setting& setting, const Camera& camera, const SplatOptions& options,
+                               const Workers& workers) {
+  return make_splat_renderer(build_splat_scene({{setting.splats}}), options, camera, workers);
+}
+
+double linear_of(const Splats& splats, double value) {
+  if (splats.light == SplatLight::linear) return value;
+  return value <= 0.04045 ? value / 12.92 : std::pow((value + 0.055) / 1.055, 2.4);
+}
+
+Image<float> luminance_of(const Splats& splats, const Image<test::SplatPixel>& pixels) {
+  Image<float> image(pixels.width(), pixels.height());
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const Eigen::Vector3d& colour = pixels.pixels()[i].colour;
+    image.pixels()[i] =
+        luminance(static_cast<float>(linear_of(splats, colour[0])), static_cast<float>(linear_of(splats, colour[1])),
+                  static_cast<float>(linear_of(splats, colour[2])));
+  }
+  return image;
+}
+
+double psnr(const Image<float>& a, const Image<float>& b) {
+  double sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) sum += std::pow(double{a.pixels()[i]} - double{b.pixels()[i]}, 2);
+  return -10 * std::log10(sum / static_cast<double>(a.size()));
+}
+
+void compare_images(const Setting& setting, const Workers& workers) {
+  const Camera camera = Camera::from_fov(346, 260, 1.0);
+  fmt::print("\nPSNR, dB, of irradiance at 346 x 260:\n{:>6} {:>18} {:>18} {:>18} {:>18}\n", "view", "depth, published",
+             "unscented, publ.", "distance, its rule", "published, dist.");
+  for (int view = 0; view < 3; ++view) {
+    const Kinematics pose = moved(setting, view);
+    const auto render = [&](SplatOrder order, SplatProjection projection) {
+      SplatOptions options;
+      options.order = order, options.projection = projection;
+      Sample sample;
+      make(setting, camera, options, workers)->render({0, pose, {{0, 0, 346, 260}}}, sample);
+      return sample.irradiance;
+    };
+    const auto slow = [&](const Rules& rules) {
+      return luminance_of(*setting.splats, test::render_slowly(*setting.splats, camera, pose.T_world_body, rules));
+    };
+    const Image<float> published = slow({Rules::Order::depth, false}), distance = slow({Rules::Order::distance, true});
+    fmt::print("{:>6} {:>18.1f} {:>18.1f} {:>18.1f} {:>18.1f}\n", view,
+               psnr(render(SplatOrder::depth, SplatProjection::linear), published),
+               psnr(render(SplatOrder::depth, SplatProjection::unscented), published),
+               psnr(render(SplatOrder::distance, SplatProjection::linear), distance), psnr(published, distance));
+  }
+}
+
+struct PixelEvent {
+  double t;
+  bool on;
+};
+using PixelEvents = std::vector<std::vector<PixelEvent>>;  ///< per pixel
+using Brightness = std::vector<float>;                     ///< log irradiance of all pixels
+
+/// The events of an ideal sensor that sees samples at an equal distance in time, linear in between.
+PixelEvents events_of(const std::vector<Brightness>& samples, double interval_s, double threshold) {
+  PixelEvents events(samples.front().size());
+  for (std::size_t pixel = 0; pixel < events.size(); ++pixel) {
+    double reference = double{samples[0][pixel]};
+    for (std::size_t k = 1; k < samples.size(); ++k) {
+      const double from = double{samples[k - 1][pixel]}, to = double{samples[k][pixel]};
+      while (std::abs(to - reference) >= threshold) {
+        const bool on = to > reference;
+        reference += on ? threshold : -threshold;
+        events[pixel].push_back({(static_cast<double>(k - 1) + (reference - from) / (to - from)) * interval_s, on});
+      }
+    }
+  }
+  return events;
+}
+
+/// The share of events that have a counterpart of the same pixel and polarity within 1 ms.
+double matched(const PixelEvents& events, const PixelEvents& others) {
+  std::size_t all = 0, found = 0;
+  for (std::size_t pixel = 0; pixel < events.size(); ++pixel) {
+    std::vector<bool> used(others[pixel].size());
+    for (const PixelEvent& event : events[pixel]) {
+      ++all;
+      for (std::size_t k = 0; k < used.size(); ++k) {
+        const PixelEvent& other = others[pixel][k];
+        if (used[k] || other.on != event.on || std::abs(other.t - event.t) > 1e-3) continue;
+        used[k] = true, ++found;
+        break;
+      }
+    }
+  }
+  return static_cast<double>(found) / static_cast<double>(std::max<std::size_t>(all, 1));
+}
+
+void compare_events(const Setting& setting, const Workers& workers) {
+  constexpr int kSamples = 160, kDenser = 8, kWidth = 173, kHeight = 130;
+  constexpr double kInterval_s = 0.5e-3, kThreshold = 0.2;
+  const Camera camera = Camera::from_fov(kWidth, kHeight, 1.0);
+  const auto brightness = [](const Image<float>& irradiance) {
+    Brightness values;
+    for (const float light : irradiance.pixels()) values.push_back(std::log(light + 1e-3F));
+    return values;
+  };
+  std::vector<Brightness> slow(kSamples + 1), fast;
+  workers.for_each(kSamples + 1, [&](int i) {
+    const SE3 pose = moved(setting, i * kInterval_s).T_world_body;
+    slow[static_cast<std::size_t>(i)] = brightness(luminance_of(
+        *setting.splats, test::render_slowly(*setting.splats, camera, pose, {Rules::Order::distance, true})));
+  });
+  const auto renderer = make(setting, camera, {}, workers);
+  for (int i = 0; i <= kSamples; i += kDenser) {
+    Sample sample;
+    renderer->render({0, moved(setting, i * kInterval_s), {{0, 0, kWidth, kHeight}}}, sample);
+    fast.push_back(brightness(sample.irradiance));
+  }
+  const PixelEvents expected = events_of(slow, kInterval_s, kThreshold);
+  const PixelEvents found = events_of(fast, kInterval_s * kDenser, kThreshold);
+  fmt::print(
+      "\nevents at {} x {}, C = {}, sampled at {:g} Hz, against slow code at {:g} Hz: {:.2f} % are matched, "
+      "{:.2f} % of the true ones are found\n",
+      kWidth, kHeight, kThreshold, 1 / (kInterval_s * kDenser), 1 / kInterval_s, 100 * matched(found, expected),
+      100 * matched(expected, found));
+}
+
+void measure_time(const Setting& setting) {
+  const Camera camera = Camera::from_fov(346, 260, 1.0);
+  fmt::print("\ntime per image at 346 x 260, and per tile of 16 x 16 in its middle, ms:\n");
+  for (const int threads : {1, 2}) {
+    const Workers workers(threads);
+    const auto renderer = make(setting, camera, {}, workers);
+    const auto time_of = [&](const Tile& tile, int repetitions) {
+      Sample sample;
+      renderer->render({0, moved(setting, 0), {tile}}, sample);
+      const auto start = std::chrono::steady_clock::now();
+      for (int i = 0; i < repetitions; ++i) renderer->render({0, moved(setting, i * 1e-3), {tile}}, sample);
+      return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count() / repetitions;
+    };
+    const double image = time_of({0, 0, 346, 260}, 50), tile = time_of({160, 128, 16, 16}, 500);
+    fmt::print("{} threads: {:.2f}, {:.3f} ({:.4f} of the image, whose share is {:.4f})\n", threads, image, tile,
+               tile / image, 256.0 / (346 * 260));
+  }
+}
+
+int run(int count, char** arguments) {
+  const Setting setting = set_up(count, arguments);
+  const Workers workers(0);
+  measure_time(setting);
+  compare_images(setting, workers);
+  compare_events(setting, workers);
+  return 0;
+}
+
+}  // namespace
+}  // namespace esim
+
+int main(int count, char** arguments) {
+  try {
+    return esim::run(count, arguments);
+  } catch (const esim::Error& error) {
+    fmt::print(stderr, "measure_splats: {}\n", error.what());
+    return 1;
+  }
+}

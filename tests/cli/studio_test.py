@@ -74,7 +74,7 @@ class Answers(StudioTest):
     def test_the_page_and_its_headers(self):
         status, headers, body = self.server.request("GET", "/")
         self.assertEqual((status, body), (200, b"<!doctype html><title>page</title>"))
-        self.assertIn("default-src 'self'", headers["Content-Security-Policy"])
+        self.assertIn("default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; img", headers["Content-Security-Policy"])
         self.assertEqual(headers["X-Content-Type-Options"], "nosniff")
         self.assertEqual(self.server.request("GET", "/api/session")[1]["Cache-Control"], "no-store")
 
@@ -248,6 +248,33 @@ class Answers(StudioTest):
             counts[name] = len(indices) / 3
         self.assertEqual(counts["whole"], 2 * n * n)
         self.assertTrue(5000 < counts["coarse"] < 30000, counts)
+
+    def test_splats_are_files_of_objects(self):
+        grey, upright = bytes([128, 128, 128, 255]), bytes([255, 128, 128, 128])
+        (self.work / "row.splat").write_bytes(b"".join(struct.pack("<6f", x, 2, 3, 0.1, 0.1, 0.1) + grey + upright for x in range(4)))
+        new = self.ask("POST", "/api/scenario/new", {"scene": "work/row.splat"})
+        self.assertEqual(new["values"]["renderer"]["type"], "splats")
+        (self.work / "tile.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n")
+        objects = ("  scale: 2\n  light: linear\n  objects:\n  - {name: few, scene: row.splat, scale: 1, trajectory: {type: static}}\n"
+                   "  - {name: tile, scene: tile.obj, trajectory: {type: static}}\n")
+        yaml = new["yaml"].replace("  scene: row.splat\n", "  scene: row.splat\n" + objects)
+        scene = self.ask("POST", "/api/scene", {"yaml": yaml, "dir": "work"})
+        self.assertEqual((scene["kind"], scene["triangles"], scene["bounds"]), ("splats", 1, [[0, 4, 6], [6, 4, 6]]))
+        self.assertEqual(scene["middle"], scene["bounds"])
+        still, few, tile = scene["objects"]
+        self.assertEqual((still["moving"], few["moving"], tile["splats"]), (False, True, None))
+        self.assertEqual({k: v for k, v in still["splats"].items() if k != "file"}, {"shown": 4, "all": 4, "filter": "dilated"})
+        status, headers, splats = self.server.request("GET", still["splats"]["file"])
+        self.assertEqual((status, headers["Content-Type"], len(splats)), (200, "application/octet-stream", 4 * 32))
+        self.assertIn("max-age", headers["Cache-Control"])
+        self.assertEqual(struct.unpack("<3f", splats[32:44]), (2, 4, 6))
+        self.assertEqual(splats[24], 188)  # the display colour of this linear light
+        self.assertEqual(struct.unpack("<3f", self.server.request("GET", few["splats"]["file"])[2][32:44]), (1, 2, 3))
+        glb = self.server.request("GET", scene["glb"])[2]
+        self.assertIn(tile["glb_node"].encode(), glb)
+        for wrong in ("2", "3", "-1", "x"):
+            self.assertEqual(self.server.request("GET", scene["glb"].removesuffix(".glb") + f"/{wrong}.splat")[0], 404, wrong)
+        self.assertEqual(self.server.request("GET", still["splats"]["file"], token=False)[0], 401)
 
     def test_the_motion_is_the_simulators(self):
         motion = self.ask("POST", "/api/trajectory", self.scenario(samples=11))

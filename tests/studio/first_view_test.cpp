@@ -112,7 +112,7 @@ TEST(FirstView, LooksAtWhatStandsStillWhereAnythingDoes) {
 }
 
 TEST(FirstView, OfNothingIsAtTheOrigin) {
-  const SE3 view = first_view({});
+  const SE3 view = first_view(Scene{});
   EXPECT_EQ(view.translation, Vector3d::Zero());
   EXPECT_NEAR(axis(view).x(), 1, 1e-12);
 }

@@ -36,8 +36,8 @@ bool is_recording_file(const std::string& extension) {
 }  // namespace
 
 FileKind kind_of(const fs::path& place) {
-  static constexpr std::array<const char*, 8> kScenes{".glb", ".gltf", ".obj", ".ply",
-                                                      ".stl", ".fbx",  ".dae", ".blend"};
+  static constexpr std::array<const char*, 11> kScenes{".glb", ".gltf",  ".obj",   ".ply", ".stl", ".fbx",
+                                                       ".dae", ".blend", ".splat", ".spz", ".sog"};
   static constexpr std::array<const char*, 8> kImages{".png", ".jpg", ".jpeg", ".webp", ".pgm", ".ppm", ".exr", ".hdr"};
   std::error_code error;
   if (fs::is_directory(place, error)) return is_recording_folder(place) ? FileKind::recording : FileKind::folder;

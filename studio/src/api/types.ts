@@ -67,16 +67,26 @@ export interface CameraModel {
   T_body_camera: Pose;
 }
 
+/** Splats of an object: `shown` of `all`, if all would be too many. */
+export interface SplatFile {
+  file: string;
+  shown: number;
+  all: number;
+  filter: "dilated" | "antialiased" | "mip";
+}
+
 export interface SceneInfo {
-  kind: "mesh" | "panorama" | "plane" | "sprites" | "engine";
+  kind: "mesh" | "splats" | "panorama" | "plane" | "sprites" | "engine";
   glb: string | null;
   texture: string | null;
   triangles: number;
   /** Of the static objects; null without static objects. */
   bounds: [[number, number, number], [number, number, number]] | null;
+  /** Of the static splats, without outliers. */
+  middle?: [[number, number, number], [number, number, number]] | null;
   /** Of the rig; look_at of waypoints refers to the first. */
   cameras: [CameraModel, ...CameraModel[]];
-  objects: { name: string; glb_node: string; moving: boolean }[];
+  objects: { name: string; glb_node: string; moving: boolean; splats: SplatFile | null }[];
   world?: {
     plane?: { pose: Pose; width_m: number; height_m: number; endless: boolean };
     panorama?: { orientation: [number, number, number, number] };

@@ -1,8 +1,11 @@
 import type { ScenarioDocument } from "../document/document.ts";
+import type { SceneInfo, SplatFile } from "../api/types.ts";
 import type { Place } from "../ui/place.ts";
+import { drawnBySoftware } from "../stage/gpu.ts";
 import { button, h, Segmented } from "../ui/dom.ts";
-import { count, shortNumber } from "../ui/format.ts";
+import { count, magnitude, shortNumber } from "../ui/format.ts";
 import { NumberField } from "../ui/number_field.ts";
+import { say } from "../ui/status.ts";
 import { addShortcuts } from "../ui/shortcuts.ts";
 import type { ClickMode } from "./dropping.ts";
 import { Inspector } from "./inspector.ts";
@@ -10,6 +13,19 @@ import { DesignState } from "./state.ts";
 import { Timeline } from "./timeline.ts";
 import { Viewport } from "./viewport.ts";
 import { WaypointPanel } from "./waypoint_panel.ts";
+
+/** How much the scene contains, and how much of it the view shows. */
+function sizeOf(info: SceneInfo | null): { text: string; cut: string; title: string } {
+  const sum = (of: (splats: SplatFile) => number) =>
+    (info?.objects ?? []).reduce((total, { splats }) => total + (splats ? of(splats) : 0), 0);
+  const [shown, all] = [sum((splats) => splats.shown), sum((splats) => splats.all)];
+  const parts: string[] = [];
+  if (all > 0) parts.push(shown < all ? `${magnitude(shown)} of ${magnitude(all)} splats` : `${count(all)} splats`);
+  if (info?.triangles) parts.push(`${count(info.triangles)} triangles`);
+  const cut = shown < all ? `The view shows ${count(shown)} of ${count(all)} splats, the most visible ones` : "";
+  const merged = all > 0 && drawnBySoftware() ? "Without a graphics card, the page merges splats to draw faster" : "";
+  return { text: parts.join(", "), cut, title: [cut, merged].filter(Boolean).join(". ") };
+}
 
 /** The place to design the motion: the scene, waypoints, and the time line. */
 export class DesignPlace implements Place {
@@ -117,7 +133,12 @@ export class DesignPlace implements Place {
     const speed = h("span", { class: "quiet fly-speed", title: "Speed of flying (+ and -)" });
     viewport.navigation.speed_m_per_s.watch((value) => (speed.textContent = `Fly ${shortNumber(value, 2)} m/s`));
     const size = h("span", { class: "quiet triangles" });
-    state.scene.listen((info) => (size.textContent = info?.triangles ? `${count(info.triangles)} triangles` : ""));
+    state.scene.listen((info) => {
+      const { text, cut, title } = sizeOf(info);
+      size.textContent = text;
+      size.title = title;
+      if (cut) say(cut);
+    });
     return h(
       "div",
       { class: "toolbar row", attrs: { role: "toolbar", "aria-label": "View" } },

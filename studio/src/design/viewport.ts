@@ -18,6 +18,7 @@ import { frustumLines, Markers } from "../stage/markers.ts";
 import { matrixOf, product } from "../stage/frames.ts";
 import { Navigation } from "../stage/navigation.ts";
 import { PathLine } from "../stage/path.ts";
+import { SplatPainter } from "../stage/splats.ts";
 import { Stage } from "../stage/stage.ts";
 import { h } from "../ui/dom.ts";
 import { seconds, shortNumber } from "../ui/format.ts";
@@ -38,6 +39,7 @@ export class Viewport {
   readonly eye: Eye;
   readonly dropper: Dropper;
   private content = new SceneContent(() => this.stage.invalidate());
+  private splats = new SplatPainter(this.stage.scene, 2, () => this.stage.invalidate());
   private markers = new Markers();
   private path = new PathLine();
   private ground = new Ground();
@@ -79,9 +81,11 @@ export class Viewport {
       if (!this.eye.large) {
         this.markers.face(stage.camera, stage.height);
         this.axes.show(stage.camera);
+        this.splats.choose(0);
         renderer.render(stage.scene, stage.camera);
       }
       this.overlays.visible = false;
+      this.splats.choose(1);
       this.eye.draw(renderer, stage.scene, stage.element);
       this.overlays.visible = true;
     };
@@ -128,7 +132,7 @@ export class Viewport {
   }
 
   private showGround(info: SceneInfo): void {
-    const flat = info.kind === "mesh" || info.kind === "plane";
+    const flat = info.kind === "mesh" || info.kind === "splats" || info.kind === "plane";
     const { bounds } = this.content;
     const [size, middle] = [bounds.getSize(new Vector3()), bounds.getCenter(new Vector3())];
     const known = !bounds.isEmpty() && Number.isFinite(size.length());
@@ -229,6 +233,8 @@ export class Viewport {
     try {
       this.stage.element.classList.add("loading");
       const changed = await this.content.show(info, this.state.document.get("renderer.lighting"));
+      const filter = info.objects.find((object) => object.splats)?.splats?.filter ?? null;
+      if (changed && this.stage.renderer) await this.splats.prepare(this.stage.renderer, filter);
       if (changed) this.stage.forgetPace();
       if (changed || first) this.showGround(info);
       if (changed && this.content.slow) this.stage.hurry();
@@ -256,7 +262,7 @@ export class Viewport {
   /** The first view: near the start of the flight, along its view. */
   private findView(info: SceneInfo, first: boolean): void {
     const size = this.content.bounds.getSize(new Vector3()).length();
-    if (info.kind === "mesh" && Number.isFinite(size) && size > 0) {
+    if ((info.kind === "mesh" || info.kind === "splats") && Number.isFinite(size) && size > 0) {
       this.navigation.speed_m_per_s.set(Math.min(10, Math.max(0.2, size / 6)));
       this.stage.camera.near = Math.max(0.005, size / 2000);
       this.stage.camera.far = Math.max(50, size * 8);

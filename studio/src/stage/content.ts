@@ -1,3 +1,4 @@
+import type { SplatMesh } from "@sparkjsdev/spark";
 import {
   Box3,
   BufferGeometry,
@@ -25,6 +26,7 @@ import type { Json, SceneInfo } from "../api/types.ts";
 import { anisotropy, drawnBySoftware } from "./gpu.ts";
 import { matrixOf, PoseTrack } from "./frames.ts";
 import { loadMesh, loadWhole, type Made } from "./mesh.ts";
+import { loadSplats } from "./splats.ts";
 
 /** Waits for a number of frames. */
 async function frames(count: number): Promise<void> {
@@ -34,11 +36,13 @@ async function frames(count: number): Promise<void> {
 /** The content of the scene, as the server describes it. */
 export class SceneContent {
   readonly group = new Group();
+  /** Without outliers. */
   readonly bounds = new Box3();
   private nodes: (Object3D | null)[] = [];
   private key = "";
   private coarse = false;
   private made: Made = { group: new Group(), details: [], small: [] };
+  private splats: (SplatMesh | null)[] = [];
   private raycaster = new Raycaster();
 
   /** `changed` is called when its appearance changes. */
@@ -46,17 +50,30 @@ export class SceneContent {
 
   /** Loads missing parts; returns whether anything changed. Textures are thumbnails first; full sizes follow. */
   async show(info: SceneInfo, lighting: Json | undefined): Promise<boolean> {
-    const key = JSON.stringify([info.kind, info.glb, info.texture, info.world, info.kind === "mesh" ? lighting : null]);
+    const key = JSON.stringify([
+      info.kind,
+      info.glb,
+      info.texture,
+      info.world,
+      info.objects,
+      info.glb ? lighting : null,
+    ]);
     if (key === this.key) return false;
-    const made = await make(info, lighting);
+    const [made, ...splats] = await Promise.all([
+      make(info, lighting),
+      ...info.objects.map((object) => object.splats && loadSplats(object.splats)),
+    ]);
     this.clear();
     this.key = key;
     this.made = made;
+    this.splats = splats;
     this.group.add(made.group);
-    this.nodes = info.objects.map((object) => made.group.getObjectByName(object.glb_node) ?? null);
+    for (const mesh of splats) if (mesh) this.group.add(mesh);
+    this.nodes = info.objects.map((object, i) => splats[i] ?? made.group.getObjectByName(object.glb_node) ?? null);
     this.group.updateMatrixWorld(true);
     this.bounds.makeEmpty();
-    if (info.bounds) this.bounds.set(new Vector3(...info.bounds[0]), new Vector3(...info.bounds[1]));
+    const box = info.middle ?? info.bounds;
+    if (box) this.bounds.set(new Vector3(...box[0]), new Vector3(...box[1]));
     if (made.small.length > 0) void this.sharpen(made);
     return true;
   }
@@ -91,6 +108,8 @@ export class SceneContent {
     this.key = "";
     for (const { coarse } of this.made.details) coarse.dispose();
     this.coarsen(false);
+    for (const mesh of this.splats) mesh?.dispose();
+    this.splats = [];
     this.group.traverse((object) => {
       if (!(object instanceof Mesh)) return;
       object.geometry.dispose();

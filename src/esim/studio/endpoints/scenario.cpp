@@ -7,6 +7,7 @@
 
 #include "esim/files/output_file.h"
 #include "esim/scenario/read.h"
+#include "esim/scene/splats/splat_file.h"
 #include "esim/studio/editor/scenario_check.h"
 #include "esim/studio/editor/schema_json.h"
 #include "esim/studio/endpoints/endpoints.h"
@@ -51,10 +52,10 @@ Json checked(const std::string& yaml, const fs::path& file, const Roots& roots) 
   return answer;
 }
 
-std::string new_scenario(const std::string& scene) {
+std::string new_scenario(const std::string& scene, bool splats) {
   YAML::Emitter name;  // with quotes if they are needed
   name << scene;
-  return fmt::format("renderer:\n  type: mesh\n  scene: {}\n", name.c_str()) +
+  return fmt::format("renderer:\n  type: {}\n  scene: {}\n", splats ? "splats" : "mesh", name.c_str()) +
          "trajectory:\n  type: waypoints\n  speed: 1\n  points: []\n"
          "camera: {width: 346, height: 260, horizontal_fov_deg: 75}\n"
          "event_camera: {contrast_threshold: 0.3}\n";
@@ -123,7 +124,7 @@ void add_scenarios(Router& router, const Roots& roots) {
     const Json body = parse_object(request.body);
     const std::string scene = text_member(body, "scene", "");
     const fs::path place = scene.empty() ? roots.list().front().folder / "scene" : roots.existing(scene);
-    const std::string yaml = new_scenario(scene.empty() ? "" : place.filename().string());
+    const std::string yaml = new_scenario(scene.empty() ? "" : place.filename().string(), is_splat_file(place));
     Json answer = checked(yaml, place.parent_path() / "scenario.yaml", roots);
     answer["dir"] = roots.name_of(place.parent_path());
     return json_response(answer);

@@ -1,3 +1,5 @@
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <charconv>
 #include <cmath>
@@ -14,17 +16,31 @@ namespace {
 constexpr const char* kForgotten = "this scene is no longer loaded; reload the page";
 constexpr const char* kKept = "private, max-age=3600";
 
-Json bounds_of(const Scene& scene) {
-  Eigen::AlignedBox3d still, all;
-  for (const SceneObject& object : scene.objects) {
-    for (const Eigen::Vector3f& vertex : object.mesh.vertices) {
-      all.extend(vertex.cast<double>());
-      if (!object.moves) still.extend(vertex.cast<double>());
-    }
-  }
-  const Eigen::AlignedBox3d& box = still.isEmpty() ? all : still;
+Json box_json(const Eigen::AlignedBox3d& box) {
   if (box.isEmpty()) return nullptr;
   return {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
+}
+
+Json bounds_of(const StudioScene& scene) {
+  Eigen::AlignedBox3d still, all;
+  for (std::size_t i = 0; i < scene.file().scene.objects.size(); ++i) {
+    const SceneObject& object = scene.file().scene.objects[i];
+    Eigen::AlignedBox3d box;
+    for (const Eigen::Vector3f& vertex : object.mesh.vertices) box.extend(vertex.cast<double>());
+    if (scene.splats()[i]) box.extend(scene.splats()[i]->box);
+    all.extend(box);
+    if (!object.moves) still.extend(box);
+  }
+  return box_json(still.isEmpty() ? all : still);
+}
+
+/// The box around the static splats without outliers, which are far away in many captures; empty without static splats.
+Eigen::AlignedBox3d middle_of(const StudioScene& scene) {
+  Eigen::AlignedBox3d box;
+  for (std::size_t i = 0; i < scene.splats().size(); ++i) {
+    if (scene.splats()[i] && !scene.file().scene.objects[i].moves) box.extend(scene.splats()[i]->middle);
+  }
+  return box;
 }
 
 /// Sets the kind of scene, and the pose of a panorama or a plane in the world.
@@ -48,7 +64,7 @@ struct DescribeKind {
     for (const double x : {-0.5, 0.5}) {
       for (const double y : {-0.5, 0.5}) box.extend(pose * Eigen::Vector3d(x * plane.width_m, y * height_m, 0));
     }
-    answer["bounds"] = {json_of(Eigen::Vector3d(box.min())), json_of(Eigen::Vector3d(box.max()))};
+    answer["bounds"] = box_json(box);
   }
   void operator()(const auto&) const { answer["kind"] = "sprites"; }  // the page shows only the simulator's images
 };
@@ -75,6 +91,22 @@ Json engine_json(const Scenario& scenario) {
           {"objects", Json::array()}};
 }
 
+/// A camera of the scene file, or a view of the scene.
+SE3 start_of(const StudioScene& scene) {
+  const SceneFile& file = scene.file();
+  if (!file.cameras.empty()) return file.cameras.front().motion.front().T_world_object;
+  const Eigen::AlignedBox3d splats = middle_of(scene);
+  return splats.isEmpty() ? first_view(file.scene) : first_view_of_splats(splats);
+}
+
+Json splats_json(const std::optional<PageSplats>& splats, const std::string& address) {
+  if (!splats) return nullptr;
+  return {{"file", address},
+          {"shown", splats->shown},
+          {"all", splats->all},
+          {"filter", kEnumNames<SplatFilter>[static_cast<std::size_t>(splats->filter)]}};
+}
+
 Json scene_json(const Scenario& scenario, SceneStore& scenes) {
   if (engine_objects(scenario.renderer) != nullptr) return engine_json(scenario);
   const auto scene = scenes.of(scenario);
@@ -83,17 +115,18 @@ Json scene_json(const Scenario& scenario, SceneStore& scenes) {
               {"glb", scene->glb() ? Json(base + ".glb") : Json()},
               {"texture", scene->texture() ? Json(base + ".jpg") : Json()},
               {"triangles", scene->triangles()},
-              {"bounds", bounds_of(scene->file().scene)}};
+              {"bounds", bounds_of(*scene)},
+              {"middle", box_json(middle_of(*scene))}};
   std::visit(DescribeKind{*scene, answer}, scenario.renderer);
   answer["cameras"] = cameras_json(cameras_of(scenario, scene->file()));
-  answer["start"] =
-      json_of(scene->file().cameras.empty() ? first_view(scene->file().scene)
-                                            : scene->file().cameras.front().motion.front().T_world_object);
+  answer["start"] = json_of(start_of(*scene));
   answer["objects"] = Json::array();
   for (std::size_t i = 0; i < scene->file().scene.objects.size(); ++i) {
     const SceneObject& object = scene->file().scene.objects[i];
-    answer["objects"].push_back(
-        {{"name", object.name}, {"glb_node", scene->glb() ? scene->glb()->nodes[i] : ""}, {"moving", object.moves}});
+    answer["objects"].push_back({{"name", object.name},
+                                 {"glb_node", scene->glb() ? scene->glb()->nodes[i] : ""},
+                                 {"moving", object.moves},
+                                 {"splats", splats_json(scene->splats()[i], fmt::format("{}/{}.splat", base, i))}});
   }
   return answer;
 }
@@ -116,19 +149,33 @@ Response scene_file(const Request& request, SceneStore& scenes) {
   return response;
 }
 
-/// A texture of a mesh in full resolution.
-Response scene_image(const Request& request, SceneStore& scenes) {
+std::optional<std::size_t> number_in(std::string_view text) {
+  std::size_t number = 0;
+  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), number);
+  return failure == std::errc() && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
+}
+
+/// A texture of a mesh in full resolution, or the splats of an object.
+Response scene_part(const Request& request, SceneStore& scenes) {
+  constexpr std::string_view kSplats = ".splat";
   const auto scene = scenes.find(request.captured[0]);
   if (scene == nullptr) throw HttpError(404, kForgotten);
-  const std::string& number = request.captured[1];
-  std::size_t index = 0;
-  const auto [end, failure] = std::from_chars(number.data(), number.data() + number.size(), index);
-  const bool is_number = failure == std::errc() && end == number.data() + number.size();
-  const auto image = is_number ? scene->image(index) : nullptr;
-  if (image == nullptr) throw HttpError(404, request.path + ": no such texture");
+  std::string_view name = request.captured[1];
   Response response;
-  response.content_type = image->type;
   response.headers = {{"Cache-Control", kKept}};
+  if (name.ends_with(kSplats)) {
+    name.remove_suffix(kSplats.size());
+    const auto index = number_in(name);
+    if (!index || *index >= scene->splats().size() || !scene->splats()[*index])
+      throw HttpError(404, request.path + ": no such splats");
+    response.content_type = content_type_of(request.captured[1]);
+    response.body = scene->splats()[*index]->bytes;
+    return response;
+  }
+  const auto index = number_in(name);
+  const auto image = index ? scene->image(*index) : nullptr;
+  if (image == nullptr) throw HttpError(404, request.path + ": no such texture");
+  response.content_type = image->type;
   response.body = image->bytes;
   return response;
 }
@@ -203,7 +250,7 @@ void add_scenes(Router& router, const Workshop& workshop) {
   router.add("GET", "/api/scenes/*",
              [workshop](const Request& request) { return scene_file(request, workshop.scenes); });
   router.add("GET", "/api/scenes/*/*",
-             [workshop](const Request& request) { return scene_image(request, workshop.scenes); });
+             [workshop](const Request& request) { return scene_part(request, workshop.scenes); });
   router.add("POST", "/api/view",
              [workshop](const Request& request) { return view(parse_object(request.body), workshop); });
 }

@@ -17,9 +17,10 @@ using Eigen::Vector2f;
 constexpr float kEyes_m = 1.6F;           // above the floor
 constexpr float kEyesOfLowRooms = 0.65F;  // fraction of the height of scenes that are lower than a room
 constexpr float kClearance_m = 0.45F;     // from walls and furniture
-constexpr float kLevel = 0.95F;           // minimum upward component of a floor's normal
-constexpr float kStorey_m = 0.3F;         // maximum height difference within one floor
-constexpr float kWide = 0.25F;            // minimum area of a wide floor, relative to the widest
+constexpr double kRoomHeight_m = 1.5, kRoomWidth_m = 2;
+constexpr float kLevel = 0.95F;    // minimum upward component of a floor's normal
+constexpr float kStorey_m = 0.3F;  // maximum height difference within one floor
+constexpr float kWide = 0.25F;     // minimum area of a wide floor, relative to the widest
 constexpr std::size_t kMaxFloors = 6;
 constexpr float kHighest_m = 1e5F;
 constexpr double kDown = 0.12;                // downward slope of the view, so that the floor is visible
@@ -173,6 +174,11 @@ std::optional<SE3> view_inside(const Scene& scene, const Floor& floor, float cei
   return best;
 }
 
+SE3 view_from_outside(const Eigen::AlignedBox3d& box) {
+  const Eigen::Vector3d along = Eigen::Vector3d(0.75, 1, -0.6).normalized();
+  return looking(box.center() - 0.5 * box.diagonal().norm() / std::sin(kHalfAngle_rad) * along, along);
+}
+
 }  // namespace
 
 SE3 first_view(const Scene& scene) {
@@ -184,9 +190,16 @@ SE3 first_view(const Scene& scene) {
   for (const Floor& floor : floors_of(scene)) {
     if (const auto inside = view_inside(scene, floor, box.max().z())) return *inside;
   }
-  const Eigen::Vector3d along = Eigen::Vector3d(0.75, 1, -0.6).normalized();
-  const double radius = 0.5 * box.diagonal().cast<double>().norm();
-  return looking(box.center().cast<double>() - radius / std::sin(kHalfAngle_rad) * along, along);
+  return view_from_outside(box.cast<double>());
+}
+
+SE3 first_view_of_splats(const Eigen::AlignedBox3d& box) {
+  const Eigen::Vector3d size = box.sizes(), middle = box.center();
+  if (size.z() < kRoomHeight_m || size.head<2>().minCoeff() < kRoomWidth_m) return view_from_outside(box);
+  const Eigen::Vector3d along = size.x() > size.y() ? Eigen::Vector3d::UnitX() : Eigen::Vector3d::UnitY();
+  Eigen::Vector3d from = middle - 0.25 * size.cwiseProduct(along);
+  from.z() = box.min().z() + std::min<double>(kEyes_m, kEyesOfLowRooms * size.z());
+  return looking(from, along - kDown * Eigen::Vector3d::UnitZ());
 }
 
 }  // namespace esim::studio

@@ -11,4 +11,8 @@ namespace esim::studio {
 /// is up. Without meshes: at the origin, along x.
 SE3 first_view(const Scene& scene);
 
+/// T_world_camera of a view of splats in a box, of which neither floors nor walls are known. If the box is as large as
+/// a room: from inside, at eye height, half the way from its middle to its end. Otherwise from outside, as above.
+SE3 first_view_of_splats(const Eigen::AlignedBox3d& box);
+
 }  // namespace esim::studio

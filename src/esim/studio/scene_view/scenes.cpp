@@ -62,9 +62,16 @@ std::string key_of(const RendererOptions& renderer) {
 }
 
 /// Whether making the renderer may fail for a reason other than an unreadable scene.
-bool fails_when_made(const RendererOptions& renderer) {
-  const auto* const mesh = std::get_if<MeshRendererOptions>(&renderer);
-  return mesh == nullptr || mesh->engine == MeshEngine::gl;
+bool fails_when_made(const RendererOptions& renderer, const Scene& scene) {
+  if (const auto* const mesh = std::get_if<MeshRendererOptions>(&renderer)) return mesh->engine == MeshEngine::gl;
+  if (!std::holds_alternative<SplatsRendererOptions>(renderer)) return true;
+  const Splats* first = nullptr;  // splats in linear light and in display colours cannot be blended
+  for (const SceneObject& object : scene.objects) {
+    if (!object.splats) continue;
+    if (first != nullptr && first->light != object.splats->light) return true;
+    first = object.splats.get();
+  }
+  return false;
 }
 
 void refuse_engines(const Scenario& scenario) {
@@ -80,8 +87,11 @@ StudioScene::StudioScene(const Scenario& scenario, std::string id, int threads)
       scenario_(scenario),
       threads_(threads),
       file_(load_scenes(scenario, SceneLook::coded, kSilent)) {
-  if (fails_when_made(scenario.renderer)) pictures();
-  if (std::holds_alternative<MeshRendererOptions>(scenario.renderer)) {
+  if (fails_when_made(scenario.renderer, file_.scene)) pictures();
+  splats_ = page_splats(file_.scene);
+  for (SceneObject& object : file_.scene.objects) object.splats = nullptr;  // they may take gigabytes
+  const bool mesh = std::holds_alternative<MeshRendererOptions>(scenario.renderer);
+  if (mesh || triangles() > 0) {
     if (triangles() <= kMaxTriangles) glb_ = make_glb(file_.scene, Workers(threads));
     return;
   }

@@ -9,6 +9,7 @@
 #include "esim/compose/scene_pictures.h"
 #include "esim/studio/scene_view/glb.h"
 #include "esim/studio/scene_view/page_images.h"
+#include "esim/studio/scene_view/page_splats.h"
 
 namespace esim::studio {
 
@@ -19,11 +20,14 @@ class StudioScene {
 
   const std::string& id() const { return id_; }
 
-  /// The scene with coded textures (see SceneLook).
+  /// The scene with coded textures (see SceneLook) and without splats.
   const SceneFile& file() const { return file_; }
 
-  /// For meshes; empty for other scenes and for too many triangles.
+  /// For meshes, also among splats; empty for other scenes and for too many triangles.
   const std::optional<Glb>& glb() const { return glb_; }
+
+  /// The splats of each object; empty for meshes.
+  const std::vector<std::optional<PageSplats>>& splats() const { return splats_; }
 
   /// A JPEG for panoramas and planes.
   const std::optional<std::string>& texture() const { return texture_; }
@@ -46,6 +50,7 @@ class StudioScene {
   Scenario scenario_;
   int threads_;
   SceneFile file_;
+  std::vector<std::optional<PageSplats>> splats_;
   std::mutex mutex_;  // of the members below
   std::optional<ScenePictures> pictures_;
   std::map<std::size_t, std::shared_ptr<const PageImage>> images_;

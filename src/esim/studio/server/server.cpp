@@ -31,9 +31,10 @@ constexpr auto kStreamPace = std::chrono::milliseconds(50);
 constexpr auto kHeartbeat = std::chrono::seconds(15);
 
 /// The content security policy of every answer: scripts, styles and data come from this server only; three.js passes
-/// images of scenes as blobs.
+/// images of scenes as blobs, and the scripts may contain WebAssembly, which sorts splats.
 constexpr const char* kPolicy =
-    "default-src 'self'; img-src 'self' blob: data:; connect-src 'self' blob: data:; worker-src 'self' blob:; "
+    "default-src 'self'; script-src 'self' 'wasm-unsafe-eval'; img-src 'self' blob: data:; "
+    "connect-src 'self' blob: data:; worker-src 'self' blob:; "
     "object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 
 }  // namespace

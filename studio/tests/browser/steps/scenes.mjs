@@ -156,6 +156,70 @@ test("a room is seen first from inside, an object from outside", async () => {
   assert.ok(far > 0.25 && far < 0.8, `at a good distance: ${outside}`);
 });
 
+/** A .splat file of [x, y, z, red, green, blue], in balls. */
+function splats(all, deviation_m) {
+  const bytes = Buffer.alloc(32 * all.length);
+  all.forEach(([x, y, z, ...colour], i) => {
+    [x, y, z, deviation_m, deviation_m, deviation_m].forEach((value, k) => bytes.writeFloatLE(value, 32 * i + 4 * k));
+    [...colour, 255, 255, 128, 128, 128].forEach((value, k) => bytes.writeUInt8(value, 32 * i + 24 + k));
+  });
+  return bytes;
+}
+
+test("splats are seen where the simulator sees them; they are clicked, and they move", async () => {
+  const steps = (n) => Array.from({ length: n }, (_, i) => i - (n - 1) / 2);
+  const ground = steps(50).flatMap((x) =>
+    steps(50).map((y) => [x / 10, y / 10, 0, ...(y > 0 ? [40, 160, 60] : [40, 60, 200])]),
+  );
+  const wall = steps(50).flatMap((y) => steps(20).map((z) => [2.5, y / 10, z / 10 + 1, 200, 180, 60]));
+  write("court.splat", splats([...ground, ...wall], 0.07));
+  write(
+    "crate.splat",
+    splats(
+      steps(4).flatMap((x) => steps(4).flatMap((y) => steps(4).map((z) => [x / 10, y / 10, z / 10, 220, 40, 40]))),
+      0.05,
+    ),
+  );
+  write(
+    "splats.yaml",
+    "renderer:\n  type: splats\n  scene: court.splat\n  objects:\n  - {name: crate, scene: crate.splat, trajectory: {type: waypoints, points: [{position: [0.5, 0.8, 0.3], quaternion: [0, 0, 0, 1], t: 0}, {position: [0.5, -0.8, 0.3], quaternion: [0, 0, 0, 1], t: 2}]}}\n" +
+      "  - {name: ball, scene: ball.glb, scale: 3, trajectory: {type: static, pose: {position: [1, 0, 1]}}}\n" +
+      `trajectory: {type: static, pose: {position: [-1.8, 0.2, 1.2], look_at: [1, 0, 0.5]}}\nduration_s: 2\n${camera}`,
+  );
+  const page = await design("splats.yaml");
+  await until(async () => / of /.test(await clock(page).textContent()), "the flight");
+  assert.match(await page.locator(".toolbar .triangles").textContent(), /3.564 splats, [0-9].* triangles/);
+  const eye = page.locator(".eye-view");
+  await page.waitForTimeout(3000); // sorting
+  const preview = await eye.screenshot();
+  await shot(page, "splats-dark");
+  await page.getByRole("radio", { name: "Simulator" }).click();
+  await until(async () => (await page.locator(".eye canvas").evaluate(({ width }) => width)) === 160, "the picture");
+  await page.waitForTimeout(300);
+  const simulated = await eye.screenshot();
+  await shot(page, "splats-simulator-dark");
+  await page.getByRole("radio", { name: "Preview" }).click();
+  assert.ok((await differing(page, preview, [0x0f, 0x11, 0x13])) > 0.6, "splats are drawn");
+  const differ = await differing(page, preview, simulated);
+  assert.ok(differ < 0.12, `the simulator sees the same: ${differ}`);
+
+  const start = await pictureOf(page);
+  await page.locator(".timeline .plot").press("End");
+  await page.waitForTimeout(2000);
+  const end = await pictureOf(page);
+  await shot(page, "splats-end-dark");
+  assert.ok((await differing(page, start, end)) > 0.005, "the crate moves");
+
+  const box = await stage(page).boundingBox();
+  await page.mouse.click(box.x + 0.15 * box.width, box.y + 0.9 * box.height);
+  await until(async () => (await rows(page).count()) === 1, "a waypoint");
+  const [, target] = /^trajectory:[\s\S]*points:[\s\S]*look_at: *\[([^\]]*)\]/m.exec(await yaml(page));
+  assert.ok(Math.abs(Number(target.split(",")[2])) < 0.15, `it looks at the ground: ${target}`);
+  await stage(page).focus();
+  await page.keyboard.press("Control+z");
+  assert.deepEqual(state.faults, []);
+});
+
 test("the ground of the picture in 3D follows the theme", async () => {
   const page = await design("ball.yaml");
   const corner = async () => {

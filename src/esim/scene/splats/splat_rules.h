@@ -17,8 +17,8 @@ inline constexpr float kFinished = 1e-4F;  ///< transmittance below which pixels
 /// Bearings at which the Jacobian of a linear projection is taken, relative to those of the image, likewise.
 inline constexpr float kLinearLimit = 1.3F;
 
-/// The radius of ideal points at which unscented points end, relative to that of the image. Points farther outside would
-/// make a splat next to the camera as large as the image.
+/// The radius of ideal points at which unscented points end, relative to that of the image. Points farther outside
+/// would make a splat next to the camera as large as the image.
 inline constexpr float kUnscentedLimit = 1.5F;
 
 /// The variance by which a filter widens splats, in squares of a pixel's footprint.

@@ -129,9 +129,16 @@ void describe(Visitor& visit, MeshRendererOptions& o) {
   visit("background", o.background, About{"irradiance of pixels that see no surface", "", 0, 1e6});
 }
 
+/// The renderer of splats.
+enum class SplatsEngine { processor, gl, automatic };
+
+inline bool on_processor(SplatsEngine engine) { return engine == SplatsEngine::processor; }
+
 /// Gaussian splats, and meshes among them.
 struct SplatsRendererOptions {
   static constexpr const char* kType = "splats";
+  SplatsEngine engine = SplatsEngine::processor;
+  std::optional<int> gl_device;
   std::filesystem::path scene;
   double scale = 1.0;
   std::optional<Eigen::Vector3d> up;
@@ -148,6 +155,12 @@ struct SplatsRendererOptions {
 
 template <class Visitor>
 void describe(Visitor& visit, SplatsRendererOptions& o) {
+  visit(
+      "engine", o.engine,
+      About{"gl: compute shaders of OpenGL, without meshes among the splats; auto: gl if there is a graphics card and "
+            "the scene has no meshes, processor otherwise"});
+  visit("gl_device", o.gl_device,
+        About{"index of the graphics device, from 0 (default: the first hardware device)", "", 0, 31});
   visit("scene", o.scene,
         About{"file of splats: PLY (also compressed), .splat, .spz, .sog, glTF with KHR_gaussian_splatting; or a mesh, "
               "among whose objects are splats"});
@@ -376,6 +389,16 @@ using RendererOptions =
     std::variant<MeshRendererOptions, SplatsRendererOptions, PanoramaRendererOptions, PlaneRendererOptions,
                  SpritesRendererOptions, UnrealcvRendererOptions, BlenderRendererOptions>;
 
+/// Whether esim certainly renders on the processor.
+inline bool on_processor(const RendererOptions& renderer) {
+  return std::visit(
+      [](const auto& options) {
+        if constexpr (requires { on_processor(options.engine); }) return on_processor(options.engine);
+        return true;
+      },
+      renderer);
+}
+
 /// The objects that a scenario adds to the scene file of its renderer; null if it can have none.
 inline const std::vector<ObjectOptions>* listed_objects(const RendererOptions& renderer) {
   return std::visit(
@@ -415,6 +438,8 @@ template <>
 inline constexpr std::array<const char*, 2> kEnumNames<SpriteInterpolation>{"spline", "linear"};
 template <>
 inline constexpr std::array<const char*, 5> kEnumNames<MeshEngine>{"processor", "raycast", "raster", "gl", "auto"};
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<SplatsEngine>{"processor", "gl", "auto"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<SplatLight>{"display", "linear"};
 template <>

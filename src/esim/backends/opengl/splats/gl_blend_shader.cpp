@@ -25,7 +25,7 @@ std::string gl_splat_rules() {
 
 // The rules are those of backends/splats/compositor.cpp.
 const char* const kBlendShader = R"(
-layout(local_size_x = kBin, local_size_y = kBin) in;
+layout(local_size_x = kBin * kBin) in;
 layout(std430, binding = 0) readonly restrict buffer ItemsIn { uvec2 items_in[]; };
 layout(std430, binding = 2) readonly restrict buffer OnScreen { vec4 on_screen[]; };
 layout(std430, binding = 4) readonly restrict buffer Curve { float curve[]; };
@@ -47,6 +47,27 @@ const uint kBatch = kBin * kBin;
 shared ScreenSplat batch[kBatch];
 shared uint unfinished;
 
+// Blocks of 8 x 4 pixels, each of 32 invocations; for each, which splats of the batch may be visible in it
+const uint kBlocksOfBin = kBatch / 32, kWords = kBatch / 32;
+shared uint reached[kBlocksOfBin * kWords];
+
+uvec2 corner_of(uint block) { return gl_WorkGroupID.xy * kBin + uvec2(block % 2 * 8, block / 2 * 4); }
+
+float exponent_at(ScreenSplat splat, vec2 d) {
+  return d.x * (splat.place.z * d.x + splat.place.w * d.y) + (splat.peak.x * d.y * d.y + splat.peak.y);
+}
+
+// Whether the splat may be visible in the block. The exponent is largest at the block's point nearest to the centre in
+// one coordinate, and at the best place in the other.
+bool may_reach(ScreenSplat splat, uint block) {
+  vec2 low = vec2(corner_of(block)) - splat.place.xy, high = low + vec2(7, 3), nearest = clamp(vec2(0), low, high);
+  float along_x = -0.5 * splat.place.w / splat.place.z * nearest.y;
+  float along_y = -0.5 * splat.place.w / splat.peak.x * nearest.x;
+  float largest = max(exponent_at(splat, vec2(clamp(along_x, low.x, high.x), nearest.y)),
+                      exponent_at(splat, vec2(nearest.x, clamp(along_y, low.y, high.y))));
+  return !(largest < kLog2Invisible - 0.001);  // with room for rounding
+}
+
 float linear_light(float encoded) {
   if (curve_steps == 0 || encoded <= 0) return max(encoded, 0);
   float at = encoded * float(curve_steps);
@@ -57,39 +78,48 @@ float linear_light(float encoded) {
 }
 
 void main() {
-  uvec2 pixel = gl_GlobalInvocationID.xy;
+  uint me = gl_LocalInvocationIndex, block = me / 32;
+  uvec2 pixel = corner_of(block) + uvec2(me % 8, me / 8 % 4);
   uvec2 range = ranges[gl_WorkGroupID.y * gl_NumWorkGroups.x + gl_WorkGroupID.x];
   bool inside = all(lessThan(pixel, uvec2(size)));
   vec3 colour = vec3(0);
   float transmittance = inside ? 1 : 0, nearness = 0, object = 0;
   for (uint start = range.x; start < range.y; start += kBatch) {
-    if (gl_LocalInvocationIndex == 0) unfinished = 0;
+    if (me == 0) unfinished = 0;
+    if (me < kBlocksOfBin * kWords) reached[me] = 0;
     barrier();
     if (transmittance > kFinished) unfinished = 1;
     barrier();
     if (unfinished == 0) break;
     uint many = min(kBatch, range.y - start);
-    if (gl_LocalInvocationIndex < many) {
-      uint from = 4 * items_in[start + gl_LocalInvocationIndex].y;
-      batch[gl_LocalInvocationIndex] =
-          ScreenSplat(on_screen[from], on_screen[from + 1], on_screen[from + 2], on_screen[from + 3]);
+    if (me < many) {
+      uint from = 4 * items_in[start + me].y;
+      ScreenSplat splat = ScreenSplat(on_screen[from], on_screen[from + 1], on_screen[from + 2], on_screen[from + 3]);
+      for (uint i = 0; i < kBlocksOfBin; ++i) {
+        if (may_reach(splat, i)) atomicOr(reached[i * kWords + me / 32], 1u << (me % 32));
+      }
+      batch[me] = splat;
     }
     barrier();
-    for (uint i = 0; i < many; ++i) {
-      vec4 place = batch[i].place, peak = batch[i].peak;
-      vec2 d = vec2(pixel) - place.xy;
-      float exponent = d.x * (place.z * d.x + place.w * d.y) + (peak.x * d.y * d.y + peak.y);
-      if (!(exponent > kLog2Invisible && transmittance > kFinished)) continue;
-      float raw = exp2(exponent);
-      float fade = clamp((raw - kInvisible) * (1 / (kFadeFrom - kInvisible)), 0, 1);
-      float weight = transmittance * min(raw * fade, kOpaque), after = transmittance - weight;
-      colour += weight * batch[i].colour.rgb;
-      if (transmittance >= 0.5 && after < 0.5) {
-        vec4 depth = batch[i].depth;
-        nearness = min(max(peak.z + dot(depth.xy, d), depth.z), depth.w);
-        object = peak.w;
+    for (uint word = 0; word < kWords; ++word) {
+      uint left = reached[block * kWords + word];
+      while (left != 0 && transmittance > kFinished) {
+        uint i = word * 32 + findLSB(left);
+        left &= left - 1;
+        vec2 d = vec2(pixel) - batch[i].place.xy;
+        float exponent = exponent_at(batch[i], d);
+        if (!(exponent > kLog2Invisible)) continue;
+        float raw = exp2(exponent);
+        float fade = clamp((raw - kInvisible) * (1 / (kFadeFrom - kInvisible)), 0, 1);
+        float weight = transmittance * min(raw * fade, kOpaque), after = transmittance - weight;
+        colour += weight * batch[i].colour.rgb;
+        if (transmittance >= 0.5 && after < 0.5) {
+          vec4 depth = batch[i].depth;
+          nearness = min(max(batch[i].peak.z + dot(depth.xy, d), depth.z), depth.w);
+          object = batch[i].peak.w;
+        }
+        transmittance = after;
       }
-      transmittance = after;
     }
     barrier();
   }

@@ -69,7 +69,7 @@ bool may_reach(ScreenSplat splat, uint block) {
 }
 
 float linear_light(float encoded) {
-  if (curve_steps == 0 || encoded <= 0) return max(encoded, 0);
+  if (curve_steps == 0 || encoded <= 0) return max(encoded, 0.0);
   float at = encoded * float(curve_steps);
   if (at >= float(curve_steps))
     return display_gamma > 0 ? pow(encoded, display_gamma) : pow((encoded + 0.055) / 1.055, 2.4);
@@ -110,7 +110,7 @@ void main() {
         float exponent = exponent_at(batch[i], d);
         if (!(exponent > kLog2Invisible)) continue;
         float raw = exp2(exponent);
-        float fade = clamp((raw - kInvisible) * (1 / (kFadeFrom - kInvisible)), 0, 1);
+        float fade = clamp((raw - kInvisible) * (1 / (kFadeFrom - kInvisible)), 0.0, 1.0);
         float weight = transmittance * min(raw * fade, kOpaque), after = transmittance - weight;
         colour += weight * batch[i].colour.rgb;
         if (transmittance >= 0.5 && after < 0.5) {

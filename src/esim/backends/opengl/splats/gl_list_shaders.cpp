@@ -198,17 +198,17 @@ void main() {
     uint digit = item.x >> shift & (digits - 1), word = me / 32, bit = me % 32;
     if (present) atomicOr(masks[digit * kWords + word], 1u << bit);
     barrier();
-    uint before = 0, all = 0;
+    uint before = 0, same = 0;
     if (present) {
       for (uint i = 0; i < kWords; ++i) {
         uint mask = masks[digit * kWords + i];
-        all += bitCount(mask);
+        same += bitCount(mask);
         before += bitCount(i < word ? mask : i == word ? mask & ((1u << bit) - 1) : 0u);
       }
       items_out[next[digit] + before] = item;
     }
     barrier();
-    if (present && before + 1 == all) next[digit] += all;
+    if (present && before + 1 == same) next[digit] += same;
   }
 }
 )";

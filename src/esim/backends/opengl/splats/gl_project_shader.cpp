@@ -144,7 +144,7 @@ void main() {
   vec4 a = splats[4 * k], b = splats[4 * k + 1], c = splats[4 * k + 2], d = splats[4 * k + 3];
   precise vec3 rough = a.xyz - position, from_camera = rough - position_remainder;
   vec3 mean = R_camera_group * from_camera;
-  float opacity = a.w * clamp(mean.z * (1 / kNearest) - 1, 0, 1);
+  float opacity = a.w * clamp(mean.z * (1 / kNearest) - 1, 0.0, 1.0);
   if (!(opacity > kInvisible)) return;
   mat3 axes = R_camera_group * mat3(b.xyz, c.xyz, d.xyz);
 

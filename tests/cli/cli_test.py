@@ -264,6 +264,24 @@ class Recordings(Cli):
                             "gl_device", "30")
         self.assert_refused(run("check", room, "--set", "renderer.engine=vulkan"), "renderer.engine", "raycast, raster, gl")
 
+    def test_opengl_shows_the_splats_that_the_processor_shows(self):
+        scene = SCENES / "splats.yaml"
+        options = ["--set", "duration_s=0.02", "--set", "output.preview=false"]
+        check = run("check", scene, "--set", "renderer.engine=gl")
+        if "libegl1" in check.stderr:
+            self.skipTest("no OpenGL: libegl1, libgl1-mesa-dri")
+        self.assertIn("on OpenGL, ", check.stdout, check.stderr)
+        events = []
+        for engine in ("gl", "processor"):
+            out = self.folder / engine
+            result = run("simulate", scene, "--out", out, "--set", f"renderer.engine={engine}", *options)
+            self.assertEqual(result.returncode, 0, result.stderr)
+            events.append(json.loads((out / "report.json").read_text())["cameras"][0]["events"])
+        self.assertLess(abs(events[0] / events[1] - 1), 0.01)
+        ball = {"scene": str(SCENES / "room" / "room.obj"), "trajectory": {"type": "static"}}
+        self.assert_refused(run("check", scene, "--set", "renderer.engine=gl", "--set", f"renderer.objects=[{json.dumps(ball)}]"),
+                            "renderer.engine", "use processor")
+
     def test_opengl_renders_keyframes(self):
         room = SCENES / "room.yaml"
         if "libegl1" in run("check", room, "--set", "renderer.engine=gl").stderr:

@@ -240,6 +240,20 @@ TEST_F(ScenarioFile, ReadsTheWaypointsOfObjectsInEveryRenderer) {
   }
 }
 
+TEST_F(ScenarioFile, SamplesCompleteImagesByDefaultIfAGraphicsCardMayRender) {
+  const std::string rest = ", scene: s.ply}\ntrajectory: {type: static}\nduration_s: 1\n";
+  const auto renders_images = [&](const std::string& renderer) {
+    const Scenario scenario = read("renderer: {type: " + renderer + rest);
+    return std::holds_alternative<FlowSampling>(scenario.cameras[0].sampling);
+  };
+  for (const std::string type : {"mesh", "splats"}) {
+    EXPECT_FALSE(renders_images(type)) << type;
+    EXPECT_FALSE(renders_images(type + ", engine: processor")) << type;
+    EXPECT_TRUE(renders_images(type + ", engine: gl")) << type;
+    EXPECT_TRUE(renders_images(type + ", engine: auto")) << type;
+  }
+}
+
 TEST_F(ScenarioFile, TakesOverrides) {
   const Scenario scenario =
       read(kMinimal, {"event_camera.contrast_threshold=0.2", "sampling.type=flow", "sampling.lambda=0.25",

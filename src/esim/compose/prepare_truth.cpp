@@ -62,6 +62,10 @@ EventPoints::MakeRenderer for_single_pixels(RendererFactory make_renderer, Rende
     mesh->samples_per_pixel = 1;
     scene.scene.lighting.reset();
     make_renderer = build_renderer_factory(options, scene, false, world.info.cameras, notices);
+  } else if (auto* const splats = std::get_if<SplatsRendererOptions>(&options);
+             splats != nullptr && !on_processor(splats->engine)) {
+    splats->engine = SplatsEngine::processor;
+    make_renderer = build_renderer_factory(options, scene, false, world.info.cameras, notices);
   }
   return [make_renderer = std::move(make_renderer)](const Camera& camera, const Workers& workers) {
     return make_renderer.make(camera, ColourFilters::none, workers);

@@ -5,6 +5,7 @@
 #include <tuple>
 
 #include "esim/backends/opengl/gl_renderer.h"
+#include "esim/backends/opengl/splats/gl_splat_renderer.h"
 #include "esim/backends/panorama/panorama_renderer.h"
 #include "esim/backends/plane/plane_renderer.h"
 #include "esim/backends/raycast/raster/raster_renderer.h"
@@ -119,10 +120,13 @@ RendererFactory factory(const SplatsRendererOptions& options, const SceneFile& f
     }
   }
   require_same_light(objects);
+  const bool only_splats = meshes.scene.objects.empty();
+  if (options.engine == SplatsEngine::gl && !only_splats)
+    throw UserError("renderer.engine: gl cannot render meshes among splats; use processor");
   MeshRendererOptions mesh;
   mesh.background = options.background;
   std::optional<RendererFactory> make_surfaces;
-  if (!meshes.scene.objects.empty()) make_surfaces = factory(mesh, meshes, colour);
+  if (!only_splats) make_surfaces = factory(mesh, meshes, colour);
 
   SplatOptions splats;
   splats.projection = options.projection;
@@ -130,6 +134,14 @@ RendererFactory factory(const SplatsRendererOptions& options, const SceneFile& f
   splats.display_gamma = options.display_gamma;
   splats.background = static_cast<float>(options.background);
   splats.gain = static_cast<float>(options.gain);
+  const bool automatic_gl = options.engine == SplatsEngine::automatic && only_splats && prefers_gl(colour);
+  if (options.engine == SplatsEngine::gl || automatic_gl) {
+    return with_area(without_edges([objects, splats, device = options.gl_device](
+                                       const Camera& camera, ColourFilters filters, double footprint, const Workers&) {
+      refuse(filters, "engine: gl", "engine: processor");
+      return make_gl_splat_renderer(objects, splats, camera, device, footprint);
+    }));
+  }
   const auto scene = build_splat_scene(objects);
   return with_area(
       without_edges([=](const Camera& camera, ColourFilters filters, double footprint, const Workers& workers) {

@@ -197,4 +197,18 @@ std::optional<Eigen::Vector2d> undistort(const Fov& model, const Eigen::Vector2d
   return distorted * (std::tan(angle) / (2.0 * std::tan(0.5 * model.w) * radius));
 }
 
+double domain_radius(const Distortion& model) {
+  constexpr double kMost = 1e3;
+  const auto valid = [&](double radius) {
+    return std::visit([&](const auto& lens) { return distort(lens, {radius, 0.0}).has_value(); }, model);
+  };
+  double inside = 0, outside = kMost;
+  if (valid(kMost)) return kMost;
+  for (int i = 0; i < kMaxHalvings; ++i) {
+    const double middle = (inside + outside) / 2;
+    (valid(middle) ? inside : outside) = middle;
+  }
+  return inside;
+}
+
 }  // namespace esim::inline geometry

@@ -25,4 +25,7 @@ std::optional<Eigen::Vector2d> undistort(const RadialTangential& model, const Ei
 std::optional<Eigen::Vector2d> undistort(const Equidistant& model, const Eigen::Vector2d& distorted);
 std::optional<Eigen::Vector2d> undistort(const Fov& model, const Eigen::Vector2d& distorted);
 
+/// The largest radius along the x axis inside the domain, at most 1000. The domain of a lens is a disc.
+double domain_radius(const Distortion& model);
+
 }  // namespace esim::inline geometry

@@ -100,9 +100,7 @@ void check_filters(const CameraOptions& camera, const YAML::Node& node, const st
 /// describe (custom renderers and online motion), keyframes if another program renders, otherwise adaptive.
 SamplingOptions usual_sampling(const RendererOptions& renderer, bool described) {
   if (engine_objects(renderer) != nullptr) return KeyframeSampling{};
-  const auto* const mesh = std::get_if<MeshRendererOptions>(&renderer);
-  const bool tiles = described && (mesh == nullptr || on_processor(mesh->engine));
-  if (tiles) return AdaptiveSampling{};
+  if (described && on_processor(renderer)) return AdaptiveSampling{};
   return FlowSampling{};
 }
 

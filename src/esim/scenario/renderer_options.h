@@ -9,8 +9,9 @@
 #include "esim/core/describe.h"
 #include "esim/light/options.h"
 #include "esim/scenario/pose_options.h"
+#include "esim/scenario/renderers/engine_options.h"
+#include "esim/scenario/renderers/lighting_options.h"
 #include "esim/scenario/trajectory_options.h"
-#include "esim/scene/engine_images.h"
 #include "esim/scene/splats/splats.h"
 #include "esim/scene/sprite.h"
 
@@ -35,56 +36,6 @@ void describe(Visitor& visit, ObjectOptions& o) {
   visit("trajectory", o.trajectory, About{"motion: pose of the object's coordinates in the world"});
   visit("flicker", o.flicker, About{"makes the object a light of its own, such as a screen or a lamp, that flickers"});
 }
-
-struct SunOptions {
-  Eigen::Vector3d direction = {0, 0, -1};
-  double strength = 1.0;
-};
-
-template <class Visitor>
-void describe(Visitor& visit, SunOptions& o) {
-  visit("direction", o.direction, About{"direction in which the light travels, world frame"});
-  visit("strength", o.strength, About{"irradiance of a white surface that faces the sun", "", 0, 1e6});
-}
-
-struct PointLightOptions {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  double strength = 1.0;
-};
-
-template <class Visitor>
-void describe(Visitor& visit, PointLightOptions& o) {
-  visit("position", o.position, About{"position, world frame", "m"});
-  visit("strength", o.strength,
-        About{"irradiance of a white surface that faces the light at a distance of 1 m", "", 0, 1e9});
-}
-
-/// Surfaces show their base colour, independent of lights.
-struct UnlitOptions {
-  static constexpr const char* kType = "unlit";
-};
-
-template <class Visitor>
-void describe(Visitor&, UnlitOptions&) {}
-
-/// Diffuse surfaces under lights.
-struct LambertOptions {
-  static constexpr const char* kType = "lambert";
-  double ambient = 0.3;
-  std::vector<SunOptions> suns;
-  std::vector<PointLightOptions> points;
-  bool shadows = false;
-};
-
-template <class Visitor>
-void describe(Visitor& visit, LambertOptions& o) {
-  visit("ambient", o.ambient, About{"irradiance of a white surface that no light reaches", "", 0, 1e6});
-  visit("suns", o.suns, About{"directional lights: a list of maps of"});
-  visit("points", o.points, About{"point lights, whose irradiance falls with the squared distance: a list of maps of"});
-  visit("shadows", o.shadows, About{"whether surfaces cast shadows"});
-}
-
-using LightingOptions = std::variant<UnlitOptions, LambertOptions>;
 
 /// The renderer of triangles.
 enum class MeshEngine { processor, raycast, raster, gl, automatic };
@@ -129,9 +80,16 @@ void describe(Visitor& visit, MeshRendererOptions& o) {
   visit("background", o.background, About{"irradiance of pixels that see no surface", "", 0, 1e6});
 }
 
+/// The renderer of splats.
+enum class SplatsEngine { processor, gl, automatic };
+
+inline bool on_processor(SplatsEngine engine) { return engine == SplatsEngine::processor; }
+
 /// Gaussian splats, and meshes among them.
 struct SplatsRendererOptions {
   static constexpr const char* kType = "splats";
+  SplatsEngine engine = SplatsEngine::processor;
+  std::optional<int> gl_device;
   std::filesystem::path scene;
   double scale = 1.0;
   std::optional<Eigen::Vector3d> up;
@@ -148,6 +106,12 @@ struct SplatsRendererOptions {
 
 template <class Visitor>
 void describe(Visitor& visit, SplatsRendererOptions& o) {
+  visit(
+      "engine", o.engine,
+      About{"gl: compute shaders of OpenGL, without meshes among the splats; auto: gl if there is a graphics card and "
+            "the scene has no meshes, processor otherwise"});
+  visit("gl_device", o.gl_device,
+        About{"index of the graphics device, from 0 (default: the first hardware device)", "", 0, 31});
   visit("scene", o.scene,
         About{"file of splats: PLY (also compressed), .splat, .spz, .sog, glTF with KHR_gaussian_splatting; or a mesh, "
               "among whose objects are splats"});
@@ -287,94 +251,19 @@ void describe(Visitor& visit, SpritesRendererOptions& o) {
   visit("background", o.background, About{"irradiance where no sprite lies", "", 0, 1e6});
 }
 
-/// An object in another program's scene that esim moves.
-struct EngineObjectOptions {
-  std::string name;
-  TrajectoryOptions trajectory;
-};
-
-template <class Visitor>
-void describe(Visitor& visit, EngineObjectOptions& o) {
-  visit("name", o.name, About{"name of the object in that program"});
-  visit("trajectory", o.trajectory, About{"motion: pose of its frame (x forward, y left, z up) in the world"});
-}
-
-/// A program that speaks UnrealCV's protocol.
-struct UnrealcvRendererOptions {
-  static constexpr const char* kType = "unrealcv";
-  std::string host = "127.0.0.1";
-  int port = 9000;
-  double timeout_s = 10;
-  int camera = 0;
-  std::vector<EngineObjectOptions> objects;
-  EngineLight light = EngineLight::automatic;
-  double exposure = 1.0;
-  EngineDepth depth = EngineDepth::automatic;
-  EngineMask object_mask = EngineMask::automatic;
-  bool pipelined = true;
-  int lag_frames = 0;
-};
-
-template <class Visitor>
-void describe(Visitor& visit, UnrealcvRendererOptions& o) {
-  visit("host", o.host, About{"host that runs the program (default: 127.0.0.1)"});
-  visit("port", o.port, About{"port on which the program listens", "", 1, 65535});
-  visit(
-      "timeout_s", o.timeout_s,
-      About{"maximum wait for the connection, for each answer, and for a program that restarts", "s", 0, 86400, true});
-  visit("camera", o.camera,
-        About{"id of the program's camera that esim moves; it serves all cameras of the rig", "", 0, 1e6});
-  visit("objects", o.objects, About{"objects of the program's scene that esim moves: a list of maps of"});
-  visit("light", o.light, About{"format of requested images; auto: npy if the program offers it, png otherwise"});
-  visit("exposure", o.exposure, About{"factor from the program's linear intensity to irradiance", "", 0, 1e6, true});
-  visit("depth", o.depth,
-        About{"which depth esim requests, and its meaning; auto: plane_depth if the program offers it, otherwise as "
-              "usual for its version"});
-  visit("object_mask", o.object_mask,
-        About{"format of requested object masks; none: the motion field treats all objects as static"});
-  visit("pipelined", o.pipelined,
-        About{"whether esim sends all commands of a frame together instead of waiting for each answer"});
-  visit("lag_frames", o.lag_frames,
-        About{"images to discard after each move, for programs that show a move late", "", 0, 100});
-}
-
-enum class BlenderEngine { cycles, eevee };
-
-/// Blender, which esim starts or which runs already.
-struct BlenderRendererOptions {
-  static constexpr const char* kType = "blender";
-  std::filesystem::path scene;
-  std::string address;
-  BlenderEngine engine = BlenderEngine::cycles;
-  int samples = 16;
-  int noise_seed = 0;
-  int threads = 0;
-  std::vector<EngineObjectOptions> objects;
-  double exposure = 1.0;
-  double timeout_s = 600;
-};
-
-template <class Visitor>
-void describe(Visitor& visit, BlenderRendererOptions& o) {
-  visit("scene", o.scene, About{"file that Blender opens: .blend, .glb, .obj, .ply, .fbx or .dae"});
-  visit("address", o.address,
-        About{"HOST:PORT of a Blender that already serves; esim then starts none, and that Blender determines scene, "
-              "engine, noise_seed and threads"});
-  visit("engine", o.engine, About{"cycles: path tracing; eevee: Blender's rasteriser"});
-  visit("samples", o.samples,
-        About{"light paths per pixel of the sensor; supersampled keyframes divide them among their pixels", "", 1,
-              65536});
-  visit("noise_seed", o.noise_seed, About{"seed of the path tracer", "", 0, 2147483647});
-  visit("threads", o.threads, About{"number of Blender's render threads; 0: all processors", "", 0, 1024});
-  visit("objects", o.objects, About{"objects of the scene that esim moves: a list of maps of"});
-  visit("exposure", o.exposure, About{"factor from Blender's linear intensity to irradiance", "", 0, 1e6, true});
-  visit("timeout_s", o.timeout_s,
-        About{"maximum wait for Blender to open the scene, and for each image", "s", 0, 86400, true});
-}
-
 using RendererOptions =
     std::variant<MeshRendererOptions, SplatsRendererOptions, PanoramaRendererOptions, PlaneRendererOptions,
                  SpritesRendererOptions, UnrealcvRendererOptions, BlenderRendererOptions>;
+
+/// Whether esim certainly renders on the processor.
+inline bool on_processor(const RendererOptions& renderer) {
+  return std::visit(
+      [](const auto& options) {
+        if constexpr (requires { on_processor(options.engine); }) return on_processor(options.engine);
+        return true;
+      },
+      renderer);
+}
 
 /// The objects that a scenario adds to the scene file of its renderer; null if it can have none.
 inline const std::vector<ObjectOptions>* listed_objects(const RendererOptions& renderer) {
@@ -416,6 +305,8 @@ inline constexpr std::array<const char*, 2> kEnumNames<SpriteInterpolation>{"spl
 template <>
 inline constexpr std::array<const char*, 5> kEnumNames<MeshEngine>{"processor", "raycast", "raster", "gl", "auto"};
 template <>
+inline constexpr std::array<const char*, 3> kEnumNames<SplatsEngine>{"processor", "gl", "auto"};
+template <>
 inline constexpr std::array<const char*, 2> kEnumNames<SplatLight>{"display", "linear"};
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<SplatFilter>{"dilated", "antialiased", "mip"};
@@ -423,14 +314,5 @@ template <>
 inline constexpr std::array<const char*, 3> kEnumNames<SplatProjection>{"auto", "linear", "unscented"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<SplatOrder>{"distance", "depth"};
-template <>
-inline constexpr std::array<const char*, 2> kEnumNames<BlenderEngine>{"cycles", "eevee"};
-template <>
-inline constexpr std::array<const char*, 3> kEnumNames<EngineLight>{"auto", "png", "npy"};
-template <>
-inline constexpr std::array<const char*, 6> kEnumNames<EngineDepth>{"auto",   "plane_depth", "ray_m",
-                                                                    "ray_cm", "planar_m",    "planar_cm"};
-template <>
-inline constexpr std::array<const char*, 4> kEnumNames<EngineMask>{"auto", "png", "npy", "none"};
 
 }  // namespace esim

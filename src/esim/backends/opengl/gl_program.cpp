@@ -1,5 +1,6 @@
 #include "esim/backends/opengl/gl_program.h"
 
+#include <initializer_list>
 #include <string>
 #include <vector>
 
@@ -30,11 +31,9 @@ GLuint compile(GLenum type, const ShaderSource& parts) {
   return shader;
 }
 
-}  // namespace
-
-GLuint make_program(const ShaderSource& vertex, const ShaderSource& fragment) {
+GLuint link(std::initializer_list<GLuint> shaders) {
   const GLuint program = glCreateProgram();
-  for (const GLuint shader : {compile(GL_VERTEX_SHADER, vertex), compile(GL_FRAGMENT_SHADER, fragment)}) {
+  for (const GLuint shader : shaders) {
     glAttachShader(program, shader);
     glDeleteShader(shader);
   }
@@ -42,5 +41,13 @@ GLuint make_program(const ShaderSource& vertex, const ShaderSource& fragment) {
   require(program, GL_LINK_STATUS, glGetProgramiv, glGetProgramInfoLog, "a program does not link");
   return program;
 }
+
+}  // namespace
+
+GLuint make_program(const ShaderSource& vertex, const ShaderSource& fragment) {
+  return link({compile(GL_VERTEX_SHADER, vertex), compile(GL_FRAGMENT_SHADER, fragment)});
+}
+
+GLuint make_compute_program(const ShaderSource& compute) { return link({compile(GL_COMPUTE_SHADER, compute)}); }
 
 }  // namespace esim::inline backends::inline opengl

@@ -3,9 +3,6 @@
 #include <algorithm>
 #include <cstdint>
 
-#include "esim/backends/opengl/gl_context.h"
-#include "esim/core/error.h"
-
 namespace esim::inline backends::inline opengl {
 namespace {
 
@@ -24,21 +21,6 @@ void read(GLuint buffer, GLenum attachment, GLenum layout, GLenum type, std::siz
 
 }  // namespace
 
-void GlReadBack::Buffer::make_room(std::size_t bytes) {
-  if (bytes <= size) return;
-  if (name != 0) glDeleteBuffers(1, &name);
-  glCreateBuffers(1, &name);
-  glNamedBufferStorage(name, static_cast<GLsizeiptr>(bytes), nullptr, GL_MAP_READ_BIT | GL_CLIENT_STORAGE_BIT);
-  size = bytes;
-}
-
-const void* GlReadBack::Buffer::map() const {
-  const void* const data = glMapNamedBufferRange(name, 0, static_cast<GLsizeiptr>(size), GL_MAP_READ_BIT);
-  if (data == nullptr) throw_on_gl_error("reading an image back");
-  if (data == nullptr) throw InternalError("gl: an image cannot be read back");
-  return data;
-}
-
 void GlReadBack::start(const GlTarget& target, const std::vector<Tile>& tiles, bool with_objects) {
   std::size_t pixels = 0;
   for (const Tile& tile : tiles) pixels += static_cast<std::size_t>(tile.area());
@@ -47,8 +29,8 @@ void GlReadBack::start(const GlTarget& target, const std::vector<Tile>& tiles, b
 
   glBindFramebuffer(GL_READ_FRAMEBUFFER, target.framebuffer);
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
-  read(seen_.name, GL_COLOR_ATTACHMENT0, GL_RGBA, GL_FLOAT, kSeenBytes, tiles);
-  if (with_objects) read(which_.name, GL_COLOR_ATTACHMENT1, GL_RED_INTEGER, GL_UNSIGNED_SHORT, kWhichBytes, tiles);
+  read(seen_.name(), GL_COLOR_ATTACHMENT0, GL_RGBA, GL_FLOAT, kSeenBytes, tiles);
+  if (with_objects) read(which_.name(), GL_COLOR_ATTACHMENT1, GL_RED_INTEGER, GL_UNSIGNED_SHORT, kWhichBytes, tiles);
   glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
   if (done_ != nullptr) glDeleteSync(done_);
   done_ = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -56,13 +38,7 @@ void GlReadBack::start(const GlTarget& target, const std::vector<Tile>& tiles, b
 }
 
 void GlReadBack::finish(Sample& sample) {
-  constexpr GLuint64 kSecond_ns = 1'000'000'000;
-  GLenum state = GL_TIMEOUT_EXPIRED;
-  while (state == GL_TIMEOUT_EXPIRED) state = glClientWaitSync(done_, GL_SYNC_FLUSH_COMMANDS_BIT, kSecond_ns);
-  if (state == GL_WAIT_FAILED) throw InternalError("gl: waiting for an image failed");
-  glDeleteSync(done_);
-  done_ = nullptr;
-
+  wait_for(done_);
   const auto* seen = static_cast<const float*>(seen_.map());
   for (const Tile& tile : sample.tiles) {
     for (int y = tile.y; y < tile.y + tile.height; ++y) {
@@ -76,7 +52,7 @@ void GlReadBack::finish(Sample& sample) {
       seen += 4 * tile.width;
     }
   }
-  glUnmapNamedBuffer(seen_.name);
+  seen_.unmap();
   if (sample.object.empty()) return;
 
   const auto* which = static_cast<const std::uint16_t*>(which_.map());
@@ -84,7 +60,7 @@ void GlReadBack::finish(Sample& sample) {
     for (int y = tile.y; y < tile.y + tile.height; ++y, which += tile.width)
       std::copy_n(which, tile.width, sample.object.row(y) + tile.x);
   }
-  glUnmapNamedBuffer(which_.name);
+  which_.unmap();
 }
 
 }  // namespace esim::inline backends::inline opengl

@@ -4,6 +4,7 @@
 
 #include <vector>
 
+#include "esim/backends/opengl/gl_buffer.h"
 #include "esim/backends/opengl/gl_targets.h"
 #include "esim/render/sample.h"
 
@@ -21,16 +22,8 @@ class GlReadBack {
   void finish(Sample& sample);
 
  private:
-  /// A buffer to which the device writes pixels and from which the processor reads them.
-  struct Buffer {
-    GLuint name = 0;
-    std::size_t size = 0;  // bytes
-
-    void make_room(std::size_t bytes);
-    const void* map() const;
-  };
-
-  Buffer seen_, which_;
+  // To which the device writes pixels and from which the processor reads them
+  GlBuffer seen_{GL_MAP_READ_BIT | GL_CLIENT_STORAGE_BIT}, which_{GL_MAP_READ_BIT | GL_CLIENT_STORAGE_BIT};
   GLsync done_ = nullptr;
 };
 

@@ -4,13 +4,10 @@
 #include <bit>
 #include <cmath>
 
-#include "esim/backends/splats/projection.h"
+#include "esim/scene/splats/splat_rules.h"
 
 namespace esim::inline backends::inline splats {
 namespace {
-
-constexpr float kOpaque = 0.99F;    // the largest opacity, as in the original 3D Gaussian splatting
-constexpr float kFinished = 1e-4F;  // transmittance below which pixels are finished, likewise
 
 HWY_INLINE Lanes load(const std::array<float, static_cast<std::size_t>(kLanes)>& row) {
   return hn::Load(kTag, row.data());

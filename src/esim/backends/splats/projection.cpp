@@ -21,23 +21,6 @@ constexpr float kHuge = 32000;  // px; limit of rectangles
 // Standard deviations of merged splats, px, up to which they are used alone, and from which the fine ones are
 constexpr float kMergedAlone = 0.15F, kFineAlone = 0.2F;
 
-/// Radius of the disc of ideal points that the lens can show.
-float domain_of(const Camera& camera) {
-  constexpr double kMost = 1e3;
-  const auto valid = [&](double radius) {
-    return std::visit([&](const auto& lens) { return distort(lens, {radius, 0.0}).has_value(); }, camera.distortion);
-  };
-  double inside = 0, outside = kMost;
-  if (valid(kMost)) return static_cast<float>(kMost);
-  for (int i = 0; i < 60; ++i) {
-    const double middle = (inside + outside) / 2;
-    (valid(middle) ? inside : outside) = middle;
-  }
-  return static_cast<float>(inside);
-}
-
-float variance_of(SplatFilter filter) { return filter == SplatFilter::mip ? 0.1F : 0.3F; }
-
 using LaneVector = std::array<Lanes, 3>;
 
 HWY_INLINE Lanes dot(const LaneVector& a, const LaneVector& b) {
@@ -172,7 +155,7 @@ Projector::Projector(const Camera& camera, SplatProjection projection, float foo
       linear_(projection == SplatProjection::linear ||
               (projection == SplatProjection::automatic && std::holds_alternative<NoDistortion>(camera.distortion))),
       area_(footprint * footprint),
-      domain_(domain_of(camera)) {
+      domain_(static_cast<float>(domain_radius(camera.distortion))) {
   const PixelRays rays(camera);
   float largest = 0, smallest = std::numeric_limits<float>::infinity(), widest = 0;
   for (int y = 0; y < camera.height; ++y) {
@@ -185,9 +168,8 @@ Projector::Projector(const Camera& camera, SplatProjection projection, float foo
       widest = std::max(widest, std::hypot(rays.x(x, y), rays.y(x, y)));
     }
   }
-  limit_x_ *= 1.3F, limit_y_ *= 1.3F;  // as in the original 3D Gaussian splatting
-  // Points of splats farther outside would make a splat next to the camera as large as the image.
-  domain_ = std::min(domain_, 1.5F * widest);
+  limit_x_ *= kLinearLimit, limit_y_ *= kLinearLimit;
+  domain_ = std::min(domain_, kUnscentedLimit * widest);
   px_per_bearing_ = 1 / (smallest * footprint);
   margin_ = largest * (1 + kReach * std::sqrt(0.3F * area_));
   // The Jacobian of a bearing r by a point at depth Z is at most sqrt(1 + r²) / Z. Unscented points are nearer, and the

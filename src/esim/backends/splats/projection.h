@@ -11,18 +11,13 @@
 #include "esim/backends/splats/splat_scene.h"
 #include "esim/geometry/camera.h"
 #include "esim/render/renderer.h"
+#include "esim/scene/splats/splat_rules.h"
 
 // Private to backends/splats.
 namespace esim::inline backends::inline splats {
 
-/// Opacities between these fade to zero. In models, splats end at 1/255.
-inline constexpr float kFadeFrom = 1.5F / 255, kInvisible = 0.5F / 255;
-
 /// A splat ends within this number of standard deviations: sqrt(2 ln(1 / kInvisible)).
 inline constexpr float kReach = 3.54F;
-
-/// Nearer splats are invisible, and splats fade up to twice this depth; m.
-inline constexpr float kNearest = 0.01F;
 
 /// A camera, relative to a group of splats.
 struct SplatView {

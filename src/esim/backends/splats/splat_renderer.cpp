@@ -8,10 +8,11 @@
 #include <utility>
 
 #include "esim/backends/splats/compositor.h"
-#include "esim/backends/splats/display_curve.h"
 #include "esim/backends/splats/projection.h"
 #include "esim/render/bands.h"
 #include "esim/render/motion_field.h"
+#include "esim/scene/planes.h"
+#include "esim/scene/splats/display_curve.h"
 
 namespace esim::inline backends::inline splats {
 namespace {

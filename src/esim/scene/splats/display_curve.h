@@ -5,11 +5,9 @@
 #include <cstddef>
 #include <vector>
 
-#include "esim/scene/planes.h"
 #include "esim/scene/splats/splats.h"
 
-// Private to backends/splats.
-namespace esim::inline backends::inline splats {
+namespace esim::inline scene {
 
 /// From the space in which splats are composited to linear light. For SplatLight::display this is a power of `gamma`,
 /// or the sRGB curve (IEC 61966-2-1) if gamma is 0; both continue above white. Between entries of the table the curve
@@ -30,6 +28,9 @@ class DisplayCurve {
     return table_[i] + (place - static_cast<float>(i)) * (table_[i + 1] - table_[i]);
   }
 
+  /// linear() from 0 to 1, in equal steps; empty if it changes nothing.
+  const std::vector<float>& table() const { return table_; }
+
   /// The inverse of linear().
   float encoded(float linear) const {
     if (table_.empty() || linear <= 0) return std::max(linear, 0.0F);
@@ -49,4 +50,4 @@ class DisplayCurve {
   std::vector<float> table_;
 };
 
-}  // namespace esim::inline backends::inline splats
+}  // namespace esim::inline scene

@@ -11,7 +11,8 @@
 namespace esim::inline backends::inline opengl {
 
 /// Renders Gaussian splats by compute shaders of OpenGL 4.5, headless, through EGL. Images are those of
-/// backends/splats/splat_renderer.h up to rounding, without surfaces among the splats and without colour filters.
+/// backends/splats/splat_renderer.h up to rounding and up to the order of splats at the same distance, without surfaces
+/// among the splats and without colour filters. Splats that are far away are not merged.
 /// `device`: index into gl_devices(); by default the first that is not software. `footprint`: side of the square that
 /// pixels average over, px.
 ///

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "esim/backends/opengl/gl_renderer.h"
+#include "esim/backends/opengl/splats/gl_splat_renderer.h"
 #include "esim/backends/panorama/panorama_renderer.h"
 #include "esim/backends/plane/plane_renderer.h"
 #include "esim/backends/raycast/raster/raster_renderer.h"
@@ -173,7 +174,7 @@ inline Splats splats_of(const Mesh& mesh, float spacing) {
 }
 
 /// moving_scene() of splats.
-inline std::shared_ptr<const SplatScene> splat_scene(bool moving) {
+inline std::vector<SplatObject> splat_objects(bool moving) {
   const auto make = [](float scale) {
     Mesh mesh = box_mesh();
     for (Eigen::Vector3f& vertex : mesh.vertices) vertex *= scale;
@@ -181,7 +182,7 @@ inline std::shared_ptr<const SplatScene> splat_scene(bool moving) {
   };
   std::vector<SplatObject> objects{{make(1)}};
   if (moving) objects.insert(objects.end(), {{make(0.15F), 0}, {make(0.2F), 1}});
-  return build_splat_scene(objects);
+  return objects;
 }
 
 /// Their motion, with constant twists, in front of the moving camera.
@@ -206,8 +207,8 @@ inline bool has_gl() { return !gl_devices().empty(); }
 /// The renderers that make_renderer() makes: those of a 3D scene, and those that draw on the sensor. "moving": two
 /// objects move; "blurred": the lens blurs.
 inline constexpr std::array kRenderersOfSpace = {
-    "panorama", "plane",     "mesh",   "moving_mesh",   "raster",           "moving_raster",
-    "gl",       "moving_gl", "splats", "moving_splats", "blurred_panorama", "moving_blurred_raster"};
+    "panorama",  "plane",  "mesh",          "moving_mesh",      "raster",           "moving_raster",        "gl",
+    "moving_gl", "splats", "moving_splats", "moving_splats_gl", "blurred_panorama", "moving_blurred_raster"};
 inline constexpr std::array kRenderersOnSensor = {"sprites", "blurred_sprites"};
 
 /// Every renderer on a scene that fills the view from near the origin. Those of `gl` and `sprites` ignore `area`.
@@ -226,9 +227,10 @@ inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Ca
   if (name == "plane") return make_plane_renderer(test_plane(), camera, workers, kNone, area.texture);
   if (name == "sprites") return make_sprites_renderer(test_sprites(), camera, workers);
   if (name.ends_with("splats")) {
-    static const auto still = splat_scene(false), moving = splat_scene(true);
+    static const auto still = build_splat_scene(splat_objects(false)), moving = build_splat_scene(splat_objects(true));
     return make_splat_renderer(name == "splats" ? still : moving, {}, camera, workers, kNone, area.texture);
   }
+  if (name.ends_with("splats_gl")) return make_gl_splat_renderer(splat_objects(true), {}, camera, {}, area.texture);
   const Scene scene = name.starts_with("moving") ? moving_scene() : still_scene(box_mesh());
   if (name.ends_with("gl")) return make_gl_renderer(scene, {}, camera);
   if (name.ends_with("raster"))

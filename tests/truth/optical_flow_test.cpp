@@ -57,7 +57,7 @@ class EveryRendererOfSpace : public test::EveryRenderer {
 };
 
 TEST_P(EveryRendererOfSpace, OpticalFlowIsTheIntegralOfTheMotionFieldAlongThePath) {
-  if (name_ == "moving_splats") GTEST_SKIP() << "splats that are as small as pixels have rough depth";
+  if (name_.starts_with("moving_splats")) GTEST_SKIP() << "splats that are as small as pixels have rough depth";
   constexpr int kSteps = 4;
   constexpr double kInterval = 0.04, kStep = kInterval / kSteps;
   std::vector<Sample> samples;
@@ -99,7 +99,7 @@ TEST_P(EveryRendererOfSpace, OpticalFlowIsTheIntegralOfTheMotionFieldAlongThePat
 }
 
 TEST_P(EveryRendererOfSpace, DepthPosesAndCalibrationMapOneImageOntoAnother) {
-  if (name_ == "moving_splats") GTEST_SKIP() << "splats that are as small as pixels have rough depth";
+  if (name_.starts_with("moving_splats")) GTEST_SKIP() << "splats that are as small as pixels have rough depth";
   const OpticalFlowImages found = optical_flow(0.05);
   const Sample here = render(0), there = render(0.05);
   double squared_error = 0, squared_change = 0;

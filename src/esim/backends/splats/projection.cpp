@@ -194,7 +194,7 @@ void ClusterBoxes::find_visible(const BearingRect& rect, std::vector<std::uint8_
   const float *mx = middle[0].data(), *my = middle[1].data(), *mz = middle[2].data();
   const float *hx = half[0].data(), *hy = half[1].data(), *hz = half[2].data(), *beyond = reach.data();
   std::uint8_t* to = visible.data();
-  const auto [left, right, top, bottom] = rect;
+  const float left = rect.left, right = rect.right, top = rect.top, bottom = rect.bottom;
 #pragma omp simd
   for (std::size_t i = 0; i < visible.size(); ++i) {
     // The planes through the camera and the sides of the rectangle

@@ -269,10 +269,12 @@ void SplatRenderer::render_part(const RenderRequest& request, const RequestWork&
     if (cluster.last_column < left || cluster.first_column > right || cluster.last_row < top ||
         cluster.first_row > bottom)
       continue;
-    std::array<std::uint8_t, ProjectedCluster::kMost> inside;
-    for (std::size_t k = 0; k < ProjectedCluster::kMost; ++k) {
-      inside[k] = static_cast<std::uint8_t>((cluster.left[k] <= right) & (cluster.right[k] >= left) &
-                                            (cluster.top[k] <= bottom) & (cluster.bottom[k] >= top));
+    std::array<std::uint16_t, ProjectedCluster::kMost> inside;
+    const auto x0 = static_cast<std::int16_t>(left), x1 = static_cast<std::int16_t>(right);
+    const auto y0 = static_cast<std::int16_t>(top), y1 = static_cast<std::int16_t>(bottom);
+    for (std::size_t k = 0; k < cluster.count; ++k) {
+      inside[k] = static_cast<std::uint16_t>((cluster.left[k] <= x1) & (cluster.right[k] >= x0) &
+                                             (cluster.top[k] <= y1) & (cluster.bottom[k] >= y0));
     }
     for (std::size_t k = 0; k < cluster.count; ++k) {
       if (inside[k] == 0) continue;

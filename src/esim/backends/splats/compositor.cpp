@@ -83,6 +83,11 @@ void Compositor::sort() {
 
 void Compositor::blend() {
   sort();
+  grey_ ? blend_all<true>() : blend_all<false>();
+}
+
+template <bool kGrey>
+void Compositor::blend_all() {
   for (const Listed& listed : splats_) {
     if (finished_ == kColumns * kRows) break;
     const ScreenSplat& splat = *listed.splat;
@@ -90,14 +95,15 @@ void Compositor::blend() {
       for (int column = listed.first_column; column <= listed.last_column; ++column) {
         Block& block = blocks_[static_cast<std::size_t>(row * kColumns + column)];
         if (block.finished) continue;
-        add_to_block(splat, static_cast<float>(left_ + column * kBlockWidth) - splat.x,
-                     static_cast<float>(top_ + row * kBlockHeight) - splat.y, block);
+        add_to_block<kGrey>(splat, static_cast<float>(left_ + column * kBlockWidth) - splat.x,
+                            static_cast<float>(top_ + row * kBlockHeight) - splat.y, block);
       }
     }
   }
 }
 
 /// (x, y): from the splat's centre to the block's first pixel.
+template <bool kGrey>
 void Compositor::add_to_block(const ScreenSplat& splat, float x, float y, Block& block) {
   const Lanes dx = hn::Add(all(x), load(kPlaces.x)), dy = hn::Add(all(y), load(kPlaces.y));
   const Lanes exponent = hn::MulAdd(dx, hn::MulAdd(all(splat.xx), dx, hn::Mul(all(splat.xy), dy)),
@@ -118,8 +124,10 @@ void Compositor::add_to_block(const ScreenSplat& splat, float x, float y, Block&
   const Lanes weight = hn::IfThenElseZero(reached, hn::Mul(before, hn::Min(faded, all(kOpaque))));
   const Lanes after = hn::Sub(before, weight);
   store(hn::MulAdd(weight, all(splat.colour[0]), load(block.red)), block.red);
-  store(hn::MulAdd(weight, all(splat.colour[1]), load(block.green)), block.green);
-  store(hn::MulAdd(weight, all(splat.colour[2]), load(block.blue)), block.blue);
+  if constexpr (!kGrey) {
+    store(hn::MulAdd(weight, all(splat.colour[1]), load(block.green)), block.green);
+    store(hn::MulAdd(weight, all(splat.colour[2]), load(block.blue)), block.blue);
+  }
   store(after, block.transmittance);
   const auto half = hn::And(hn::Ge(before, all(0.5F)), hn::Lt(after, all(0.5F)));
   if (!hn::AllFalse(kTag, half)) {

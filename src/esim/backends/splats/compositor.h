@@ -19,6 +19,9 @@ class Compositor {
  public:
   static constexpr int kSide = 16;  ///< of a bin, px
 
+  /// `grey`: only the first colour is blended.
+  explicit Compositor(bool grey = false) : grey_(grey) {}
+
   /// Begins the bin whose first pixel is (left, top).
   void start(int left, int top);
 
@@ -64,8 +67,12 @@ class Compositor {
   }
 
   void sort();
+  template <bool kGrey>
+  void blend_all();
+  template <bool kGrey>
   void add_to_block(const ScreenSplat& splat, float x, float y, Block& block);
 
+  bool grey_;
   int left_ = 0, top_ = 0;
   bool surfaces_ = false;
   std::vector<Listed> splats_, sorted_;

@@ -150,10 +150,11 @@ SplatView::SplatView(const RenderRequest& request, std::size_t object, const Eig
   position_remainder = (T_group_camera.translation - position.cast<double>()).cast<float>();
 }
 
-Projector::Projector(const Camera& camera, SplatProjection projection, float footprint)
+Projector::Projector(const Camera& camera, SplatProjection projection, float footprint, bool grey)
     : camera_(camera),
       linear_(projection == SplatProjection::linear ||
               (projection == SplatProjection::automatic && std::holds_alternative<NoDistortion>(camera.distortion))),
+      grey_(grey),
       area_(footprint * footprint),
       domain_(static_cast<float>(domain_radius(camera.distortion))) {
   const PixelRays rays(camera);
@@ -306,7 +307,11 @@ void Projector::project_through(const Lens& lens, const SplatGroup& group, const
     const Lanes reach2 = hn::Mul(all(2 / kLog2E), hn::Sub(peak, all(std::log2(kInvisible))));
     const Lanes half_width = hn::Sqrt(hn::Mul(reach2, xx)), half_height = hn::Sqrt(hn::Mul(reach2, yy));
 
-    const LaneVector colour = colours_of(group, i, from_camera);
+    LaneVector colour = colours_of(group, i, from_camera);
+    if (grey_) {
+      const auto [red, green, blue] = colour;
+      colour[0] = hn::MulAdd(all(0.2126F), hn::Sub(red, green), hn::MulAdd(all(0.0722F), hn::Sub(blue, green), green));
+    }
     // Without the rotation, so that turning the camera does not even change its rounding
     const Lanes distance = hn::Sqrt(dot(from_camera, from_camera));
     const LaneRect rect{hn::Ceil(hn::Sub(shape.centre.x, half_width)), hn::Floor(hn::Add(shape.centre.x, half_width)),

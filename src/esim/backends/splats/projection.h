@@ -56,8 +56,9 @@ struct ClusterBoxes {
 /// Projects splats to the image of a camera.
 class Projector {
  public:
-  /// `footprint`: side of the square that pixels average over, px.
-  Projector(const Camera& camera, SplatProjection projection, float footprint);
+  /// `footprint`: side of the square that pixels average over, px. `grey`: the first colour of projected splats is
+  /// their luminance.
+  Projector(const Camera& camera, SplatProjection projection, float footprint, bool grey = false);
 
   /// The boxes of all clusters. Where merged splats are smaller than a pixel's filter, they replace the fine ones; the
   /// change is gradual.
@@ -79,7 +80,7 @@ class Projector {
                        float share, float object, ProjectedCluster& projected) const;
 
   Camera camera_;
-  bool linear_;
+  bool linear_, grey_;
   float area_;                       // square of the footprint, px²
   float domain_;                     // radius of ideal points at which unscented points end
   float limit_x_ = 0, limit_y_ = 0;  // of the bearings at which the Jacobian of a linear projection is taken

@@ -1,7 +1,6 @@
 #include "esim/backends/splats/splat_renderer.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <mutex>
@@ -59,7 +58,8 @@ class SplatRenderer final : public ProcessorRenderer {
       : scene_(std::move(scene)),
         options_(options),
         rays_(camera),
-        projector_(camera, options.projection, static_cast<float>(footprint)),
+        grey_(scene_->light == SplatLight::linear && filters == ColourFilters::none),
+        projector_(camera, options.projection, static_cast<float>(footprint), grey_),
         workers_(workers),
         filters_(filters),
         curve_(scene_->light, options.display_gamma),
@@ -108,6 +108,7 @@ class SplatRenderer final : public ProcessorRenderer {
   std::shared_ptr<const SplatScene> scene_;
   SplatOptions options_;
   PixelRays rays_;
+  bool grey_;  // linear light can be blended as luminance
   Projector projector_;
   const Workers& workers_;
   ColourFilters filters_;
@@ -211,7 +212,7 @@ void SplatRenderer::compute(std::span<const RenderRequest> requests, Sample& sam
 
   std::unique_ptr<Work> work = take_work();
   work->requests.resize(requests.size());
-  work->threads.resize(static_cast<std::size_t>(workers_.threads()));
+  work->threads.resize(static_cast<std::size_t>(workers_.threads()), {Compositor(grey_), {}});
   workers_.for_each(static_cast<int>(requests.size()), [&](int r) {
     collect(requests[static_cast<std::size_t>(r)], work->requests[static_cast<std::size_t>(r)]);
   });
@@ -298,8 +299,14 @@ void SplatRenderer::write(const Compositor& compositor, int left, int top, const
       const float light = surfaces_.renderer != nullptr ? sample.irradiance(x, y) : options_.background;
       const float behind = pixel.transmittance * curve_.encoded(light / options_.gain);
       const auto linear = [&](std::size_t colour) { return curve_.linear(pixel.colour[colour] + behind); };
-      const float value =
-          filters_ == ColourFilters::none ? luminance(linear(0), linear(1), linear(2)) : linear(colour_at(x, y));
+      float value = 0;
+      if (grey_) {
+        value = linear(0);
+      } else if (filters_ == ColourFilters::none) {
+        value = luminance(linear(0), linear(1), linear(2));
+      } else {
+        value = linear(colour_at(x, y));
+      }
       sample.irradiance(x, y) = options_.gain * value;
       if (pixel.nearness > 0) {
         sample.depth(x, y) = 1 / pixel.nearness;

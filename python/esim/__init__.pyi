@@ -60,7 +60,15 @@ class Trajectory:
     ) -> Trajectory: ...
     @classmethod
     def load(
-        cls, path: Path, *, order: Int = 5, knot_interval_s: Number = 0.0, smoothing_time_s: Number = 0.0
+        cls,
+        path: Path,
+        *,
+        rate_hz: Number | None = None,
+        scale: Number = 1.0,
+        up: ArrayLike | None = None,
+        order: Int = 5,
+        knot_interval_s: Number = 0.0,
+        smoothing_time_s: Number = 0.0,
     ) -> Trajectory: ...
     @property
     def start(self) -> int: ...

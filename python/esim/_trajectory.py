@@ -76,15 +76,22 @@ class Trajectory:
         return cls._of(_core.Trajectory.from_matrices(t, T, *_fit(order, knot_interval_s, smoothing_time_s)))
 
     @classmethod
-    def load(cls, path, *, order=5, knot_interval_s=0.0, smoothing_time_s=0.0):
+    def load(
+        cls, path, *, rate_hz=None, scale=1.0, up=None, order=5, knot_interval_s=0.0, smoothing_time_s=0.0
+    ):
         """Fits a spline to the poses of a file.
 
         The file is TUM text, CSV of the original ESIM, a COLMAP model (folder or images file) or a transforms.json.
-        Images without times follow each other at 30 Hz.
 
         Parameters
         ----------
         path : path
+        rate_hz : float, optional
+            Images per second of a file without times; 30 if it is not given.
+        scale : float
+            Metres per unit of the file's positions.
+        up : sequence of 3 floats, optional
+            Direction in the file that becomes the world's z axis; by default, axes are those of the file.
         order, knot_interval_s, smoothing_time_s
             As in `from_poses`.
 
@@ -92,7 +99,14 @@ class Trajectory:
         -------
         Trajectory
         """
-        return cls._of(_core.Trajectory.from_file(os.fspath(path), *_fit(order, knot_interval_s, smoothing_time_s)))
+        rate_hz = None if rate_hz is None else _checks.number(rate_hz, "rate_hz", above=0)
+        scale = _checks.number(scale, "scale", above=0)
+        if up is not None:
+            up = [_checks.number(value, "up") for value in np.asarray(up).ravel()]
+            if len(up) != 3:
+                raise Error(f"up must have three numbers, not {len(up)}")
+        fit = _fit(order, knot_interval_s, smoothing_time_s)
+        return cls._of(_core.Trajectory.from_file(os.fspath(path), rate_hz, scale, up, *fit))
 
     @property
     def start(self):

@@ -54,6 +54,19 @@ def test_files(tmp_path):
         esim.Trajectory.load(tmp_path / "none.txt")
 
 
+def test_poses_of_a_reconstruction(tmp_path):
+    # A camera that moves along x; COLMAP stores the inverse of its pose.
+    images = "".join(f"{i + 1} 1 0 0 0 {-0.1 * i} 0 0 1 frame{i}.png\n\n" for i in range(20))
+    (tmp_path / "images.txt").write_text(images)
+    (tmp_path / "cameras.txt").write_text("1 PINHOLE 120 90 100 100 60 45\n")
+    trajectory = esim.Trajectory.load(tmp_path, rate_hz=10, scale=2, up=[0, -1, 0])
+    np.testing.assert_allclose(trajectory.pose(1.0)[:3, 3], [2, 0, 0], atol=1e-6)
+    np.testing.assert_allclose(trajectory.pose(1.0)[:3, 1], [0, 0, -1], atol=1e-9)  # the image's y axis points down
+    for option in ({"rate_hz": 0}, {"scale": -1}, {"up": [0, 0, 0]}, {"up": [1, 2]}):
+        with pytest.raises(esim.Error, match=next(iter(option))):
+            esim.Trajectory.load(tmp_path, **option)
+
+
 def test_what_is_no_motion_is_refused():
     t, T = circle()
     trajectory = esim.Trajectory.from_poses(t, T)

@@ -1,10 +1,14 @@
 #include "simulation/trajectory.h"
 
+#include <nanobind/stl/array.h>
 #include <nanobind/stl/filesystem.h>
+#include <nanobind/stl/optional.h>
 #include <nanobind/stl/string.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
+#include <optional>
 #include <utility>
 
 #include "arrays.h"
@@ -45,10 +49,14 @@ SharedTrajectory from_matrices(const Times& times, const Matrices& matrices, int
   return fit(std::move(poses), {order, knot_interval_s, smoothing_time_s});
 }
 
-SharedTrajectory from_file(const std::filesystem::path& path, int order, double knot_interval_s,
+SharedTrajectory from_file(const std::filesystem::path& path, std::optional<double> rate_hz, double scale,
+                           std::optional<std::array<double, 3>> up, int order, double knot_interval_s,
                            double smoothing_time_s) {
+  TrajectoryFileOptions options{rate_hz, scale};
+  if (up) options.up.emplace((*up)[0], (*up)[1], (*up)[2]);
+  check_options(options);
   try {
-    return fit(read_trajectory(path), {order, knot_interval_s, smoothing_time_s});
+    return fit(read_trajectory_file(path, options).poses, {order, knot_interval_s, smoothing_time_s});
   } catch (const UserError& error) {
     const std::string message = error.what();
     throw UserError(message.starts_with(path.string()) ? message : path.string() + ": " + message);
@@ -112,8 +120,8 @@ void bind_trajectory(nb::module_& module) {
   nb::class_<SharedTrajectory>(module, "Trajectory")
       .def_static("from_matrices", &from_matrices, nb::arg("times"), nb::arg("matrices"), nb::arg("order"),
                   nb::arg("knot_interval_s"), nb::arg("smoothing_time_s"))
-      .def_static("from_file", &from_file, nb::arg("path"), nb::arg("order"), nb::arg("knot_interval_s"),
-                  nb::arg("smoothing_time_s"))
+      .def_static("from_file", &from_file, nb::arg("path"), nb::arg("rate_hz").none(), nb::arg("scale"),
+                  nb::arg("up").none(), nb::arg("order"), nb::arg("knot_interval_s"), nb::arg("smoothing_time_s"))
       .def_static("from_state", &from_state, nb::arg("poses"), nb::arg("order"), nb::arg("knot_interval_s"),
                   nb::arg("smoothing_time_s"))
       .def("state", &state)

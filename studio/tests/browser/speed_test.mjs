@@ -134,13 +134,19 @@ test("half a million triangles: flown through in few, rested on in all, picked e
   const rate = ((await page.evaluate(() => window.framesAsked)) - asked) / ((Date.now() - begin) / 1000);
   await shot(page, "hills-flying");
   const box = await stage(page).boundingBox();
-  await page.mouse.click(box.x + 0.4 * box.width, box.y + 0.95 * box.height);
+  const click = () => page.mouse.click(box.x + 0.4 * box.width, box.y + 0.95 * box.height);
+  await click();
   await page.keyboard.up("w");
   expectQuick(context, rate > 5, `${rate.toFixed(1)} frames/s while flying, of ${drawn / 3} triangles`);
-  await until(async () => (await rows(page).count()) === 3, "a waypoint");
+  const placed = () => until(async () => (await rows(page).count()) >= 3, "a waypoint", 10_000);
+  await placed().catch(async () => {
+    await press(page, "s", 4000); // a busy machine has flown beyond the hills: back
+    await click();
+    await placed();
+  });
   const yaml = await until(async () => {
     const text = await textOf(page);
-    return text.split("look_at").length === 4 ? text : null;
+    return text.split("look_at").length === (await rows(page).count()) + 1 ? text : null;
   }, "its text");
   const aims = [...yaml.matchAll(/look_at: *\[([^\]]*)\]/g)].map((match) => match[1].split(",").map(Number));
   const [x, y, z] = aims.at(-1);

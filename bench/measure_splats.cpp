@@ -159,6 +159,16 @@ double matched(const PixelEvents& events, const PixelEvents& others) {
   return static_cast<double>(found) / static_cast<double>(std::max<std::size_t>(all, 1));
 }
 
+/// The sum of all changes of all pixels: what an event camera responds to.
+double variation(const std::vector<Brightness>& samples) {
+  double sum = 0;
+  for (std::size_t k = 1; k < samples.size(); ++k) {
+    for (std::size_t pixel = 0; pixel < samples[k].size(); ++pixel)
+      sum += std::abs(double{samples[k][pixel]} - double{samples[k - 1][pixel]});
+  }
+  return sum;
+}
+
 void compare_events(const Setting& setting, const Workers& workers) {
   constexpr int kSamples = 160, kDenser = 8, kWidth = 173, kHeight = 130;
   constexpr double kInterval_s = 0.5e-3, kThreshold = 0.2;
@@ -168,12 +178,18 @@ void compare_events(const Setting& setting, const Workers& workers) {
     for (const float light : irradiance.pixels()) values.push_back(std::log(light + 1e-3F));
     return values;
   };
-  std::vector<Brightness> slow(kSamples + 1), fast;
-  workers.for_each(kSamples + 1, [&](int i) {
-    const SE3 pose = moved(setting, i * kInterval_s).T_world_body;
-    slow[static_cast<std::size_t>(i)] = brightness(luminance_of(
-        *setting.splats, test::render_slowly(*setting.splats, camera, pose, {Rules::Order::distance, true})));
-  });
+  const auto render_all_slowly = [&](Rules::Order order) {
+    std::vector<Brightness> samples(kSamples + 1);
+    workers.for_each(kSamples + 1, [&](int i) {
+      const SE3 pose = moved(setting, i * kInterval_s).T_world_body;
+      samples[static_cast<std::size_t>(i)] =
+          brightness(luminance_of(*setting.splats, test::render_slowly(*setting.splats, camera, pose, {order, true})));
+    });
+    return samples;
+  };
+  const std::vector<Brightness> slow = render_all_slowly(Rules::Order::distance),
+                                by_ray = render_all_slowly(Rules::Order::ray);
+  std::vector<Brightness> fast;
   const auto renderer = make(setting, camera, {}, workers);
   for (int i = 0; i <= kSamples; i += kDenser) {
     Sample sample;
@@ -187,6 +203,11 @@ void compare_events(const Setting& setting, const Workers& workers) {
       "{:.2f} % of the true ones are found\n",
       kWidth, kHeight, kThreshold, 1 / (kInterval_s * kDenser), 1 / kInterval_s, 100 * matched(found, expected),
       100 * matched(expected, found));
+  const PixelEvents expected_by_ray = events_of(by_ray, kInterval_s, kThreshold);
+  fmt::print("against slow code that sorts by the mean depth in each pixel: {:.2f} % and {:.2f} %\n",
+             100 * matched(found, expected_by_ray), 100 * matched(expected_by_ray, found));
+  fmt::print("total variation of log E in the slow code: {:.0f} by distance, {:.0f} by the mean depth in each pixel\n",
+             variation(slow), variation(by_ray));
 }
 
 void measure_time(const Setting& setting) {

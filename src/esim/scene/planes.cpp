@@ -87,6 +87,10 @@ float linear_from_srgb(float encoded) {
   return encoded <= 0.04045F ? encoded / 12.92F : std::pow((encoded + 0.055F) / 1.055F, 2.4F);
 }
 
+float srgb_from_linear(float linear) {
+  return linear <= 0.0031308F ? 12.92F * linear : 1.055F * std::pow(linear, 1 / 2.4F) - 0.055F;
+}
+
 void resize(Planes& planes, int width, int height, bool colour) {
   planes.resize(colour ? 3 : 1);
   for (Image<float>& plane : planes) {

@@ -42,7 +42,10 @@ constexpr float luminance(float red, float green, float blue) {
 /// Resizes `planes` to one or three planes of a size; keeps the memory if they already have it.
 void resize(Planes& planes, int width, int height, bool colour);
 
-/// Inverse of the sRGB transfer function (IEC 61966-2-1), for values on [0, 1].
+/// Inverse of the sRGB transfer function (IEC 61966-2-1), for values from 0 on; it continues above 1.
 float linear_from_srgb(float encoded);
+
+/// The sRGB transfer function, for values from 0 on; it continues above 1.
+float srgb_from_linear(float linear);
 
 }  // namespace esim::inline scene

@@ -41,11 +41,6 @@ void divide(std::span<Item> items, std::size_t length, const Take& take) {
   divide(items.subspan(middle), length, take);
 }
 
-/// The area of a splat's outline, up to a factor, seen from the side where it is largest.
-double area_of(const Eigen::Vector3d& deviations) {
-  return std::max({deviations.x() * deviations.y(), deviations.y() * deviations.z(), deviations.z() * deviations.x()});
-}
-
 /// Sets splat `to` to the one that replaces `run`.
 void set_merged(const Splats& splats, std::span<const std::uint32_t> run, std::size_t to, Splats& merged) {
   double total = 0;
@@ -55,7 +50,7 @@ void set_merged(const Splats& splats, std::span<const std::uint32_t> run, std::s
   std::array<double, SplatClusters::kMerged> weights{};
   for (std::size_t k = 0; k < run.size(); ++k) {
     const std::uint32_t i = run[k];
-    weights[k] = double{splats.opacities[i]} * area_of(splats.deviations[i].cast<double>()) + 1e-30;
+    weights[k] = double{splats.opacities[i]} * largest_area(splats.deviations[i].cast<double>()) + 1e-30;
     total += weights[k];
     mean += weights[k] * splats.positions[i].cast<double>();
     harmonics.head(terms) += static_cast<float>(weights[k]) *
@@ -77,7 +72,7 @@ void set_merged(const Splats& splats, std::span<const std::uint32_t> run, std::s
   merged.positions[to] = mean.cast<float>();
   merged.deviations[to] = deviations.cast<float>();
   merged.rotations[to] = Eigen::Quaterniond(R).coeffs().cast<float>();
-  merged.opacities[to] = static_cast<float>(std::min(0.99, total / std::max(area_of(deviations), 1e-30)));
+  merged.opacities[to] = static_cast<float>(std::min(0.99, total / std::max(largest_area(deviations), 1e-30)));
   Eigen::Map<Eigen::ArrayXf>(&merged.harmonics[to * splats.coefficients() * 3], terms) =
       harmonics.head(terms) / static_cast<float>(total);
 }

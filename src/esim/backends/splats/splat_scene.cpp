@@ -57,7 +57,7 @@ void SplatGroup::fill(std::size_t cluster, const Splats& splats, std::span<const
     for (std::size_t i = 0; i < count; ++i) {
       const float value = splats.harmonics[source(i) * stride + k];
       if (k < 3) {
-        colour[k][first + i] = 0.5F + 0.28209479177387814F * value;
+        colour[k][first + i] = 0.5F + kHarmonic0 * value;
       } else {
         harmonics[(k - 3) * size + first + i] =
             std::bit_cast<std::uint16_t>(Eigen::half(std::clamp(value, -65504.0F, 65504.0F)));

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <vector>
 
+#include "esim/scene/planes.h"
 #include "esim/scene/splats/splats.h"
 
 namespace esim::inline scene {
@@ -34,17 +35,13 @@ class DisplayCurve {
   /// The inverse of linear().
   float encoded(float linear) const {
     if (table_.empty() || linear <= 0) return std::max(linear, 0.0F);
-    if (gamma_ > 0) return std::pow(linear, 1 / gamma_);
-    return linear <= 0.0031308F ? 12.92F * linear : 1.055F * std::pow(linear, 1 / 2.4F) - 0.055F;
+    return gamma_ > 0 ? std::pow(linear, 1 / gamma_) : srgb_from_linear(linear);
   }
 
  private:
   static constexpr std::size_t kEntries = 4096;
 
-  float exact(float encoded) const {
-    if (gamma_ > 0) return std::pow(encoded, gamma_);
-    return encoded <= 0.04045F ? encoded / 12.92F : std::pow((encoded + 0.055F) / 1.055F, 2.4F);
-  }
+  float exact(float encoded) const { return gamma_ > 0 ? std::pow(encoded, gamma_) : linear_from_srgb(encoded); }
 
   float gamma_;
   std::vector<float> table_;

@@ -13,8 +13,7 @@
 namespace esim::inline scene {
 
 inline constexpr int kMaxSplatDegree = 3;
-inline constexpr std::size_t kMaxSplatCoefficients = 16;   // of a colour: (kMaxSplatDegree + 1)²
-inline constexpr float kHarmonic0 = 0.28209479177387814F;  // Y of degree 0: sqrt(1 / 4π)
+inline constexpr std::size_t kMaxSplatCoefficients = 16;  // of a colour: (kMaxSplatDegree + 1)²
 
 /// A splat as read from a file.
 struct Splat {

@@ -4,9 +4,11 @@
 
 #include <algorithm>
 
-#include "esim/scene/splats/splat_list.h"
-
 namespace esim::inline scene {
+
+double largest_area(const Eigen::Vector3d& deviations) {
+  return std::max({deviations.x() * deviations.y(), deviations.y() * deviations.z(), deviations.z() * deviations.x()});
+}
 
 Eigen::AlignedBox3d bounds(const Splats& splats) {
   Eigen::AlignedBox3d box;
@@ -19,9 +21,7 @@ double share_at_white(const Splats& splats) {
   if (splats.light == SplatLight::linear) return 0;
   double white = 0, all = 0;
   for (std::size_t i = 0; i < splats.size(); ++i) {
-    const Eigen::Vector3d d = splats.deviations[i].cast<double>();
-    const double area = std::max({d.x() * d.y(), d.y() * d.z(), d.z() * d.x()});
-    const double weight = double{splats.opacities[i]} * area;
+    const double weight = double{splats.opacities[i]} * largest_area(splats.deviations[i].cast<double>());
     const float* const harmonics = &splats.harmonics[i * splats.coefficients() * 3];
     const float brightest = 0.5F + kHarmonic0 * std::max({harmonics[0], harmonics[1], harmonics[2]});
     all += weight;

@@ -35,6 +35,8 @@ enum class SplatOrder {
   depth,     ///< of their centres, as the original 3D Gaussian splatting
 };
 
+inline constexpr float kHarmonic0 = 0.28209479177387814F;  ///< Y of degree 0: sqrt(1 / 4π)
+
 /// A scene of three-dimensional Gaussians. All arrays have an entry per splat.
 struct Splats {
   std::vector<Eigen::Vector3f> positions;   ///< of their centres, m
@@ -59,6 +61,9 @@ struct Splats {
   std::size_t size() const { return positions.size(); }
   std::size_t coefficients() const { return static_cast<std::size_t>((degree + 1) * (degree + 1)); }
 };
+
+/// The area of a splat's outline from the side where it is largest, up to a factor; m².
+double largest_area(const Eigen::Vector3d& deviations);
 
 /// The box around the centres, in the object's coordinates.
 Eigen::AlignedBox3d bounds(const Splats& splats);

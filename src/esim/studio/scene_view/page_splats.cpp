@@ -5,18 +5,18 @@
 #include <cstdint>
 #include <functional>
 
+#include "esim/scene/planes.h"
+
 namespace esim::studio {
 namespace {
 
 constexpr float kWhite = 255;
-constexpr float kHarmonic0 = 0.28209479F;  // of degree 0: sqrt(1 / 4π)
 constexpr std::size_t kSplatBytes = 32;
 constexpr double kOutermost = 0.01;
 
 /// Opacity times the area of the largest projection.
 float visibility(const Splats& splats, std::size_t i) {
-  const Eigen::Vector3f& s = splats.deviations[i];
-  return splats.opacities[i] * std::max({s.x() * s.y(), s.y() * s.z(), s.z() * s.x()});
+  return splats.opacities[i] * static_cast<float>(largest_area(splats.deviations[i].cast<double>()));
 }
 
 /// Chooses the splats whose visibility is above `least`, and the first `ties` whose visibility equals it.
@@ -41,10 +41,6 @@ Choice choice_of(const Scene& scene, std::size_t max) {
 }
 
 std::uint8_t byte_of(float value) { return static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.F, kWhite))); }
-
-float srgb_from_linear(float linear) {
-  return linear <= 0.0031308F ? 12.92F * linear : 1.055F * std::pow(linear, 1 / 2.4F) - 0.055F;
-}
 
 std::uint8_t display_colour(const Splats& splats, std::size_t i, std::size_t colour) {
   const float value = 0.5F + kHarmonic0 * splats.harmonics[i * splats.coefficients() * 3 + colour];

@@ -41,7 +41,7 @@ GlBuffer upload_shapes(const Splats& splats) {
       to += 4;
       for (int k = 0; k < 3; ++k) to[k] = R(k, axis) * deviations[axis];
       const float harmonic = splats.harmonics[i * splats.coefficients() * 3 + static_cast<std::size_t>(axis)];
-      to[3] = 0.5F + 0.28209479177387814F * harmonic;  // a colour, without the other harmonics
+      to[3] = 0.5F + kHarmonic0 * harmonic;  // a colour, without the other harmonics
     }
   }
   return buffer_of(values);

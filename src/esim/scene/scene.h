@@ -5,13 +5,14 @@
 #include <string>
 #include <vector>
 
+#include "esim/scene/deformation/deformation.h"
 #include "esim/scene/lighting.h"
 #include "esim/scene/mesh.h"
 #include "esim/scene/splats/splats.h"
 
 namespace esim::inline scene {
 
-/// A rigid part of a scene: all that is static, or an object with its own motion.
+/// A part of a scene: all that is static, or an object with its own motion.
 struct SceneObject {
   std::string name;
   Mesh mesh;           ///< in the object's frame, which is the world frame if it does not move
@@ -19,6 +20,9 @@ struct SceneObject {
 
   /// If set, the object consists of these instead of the mesh, which is empty.
   std::shared_ptr<const Splats> splats{};
+
+  /// If set, the mesh deforms, and `mesh` is its shape at the start. Such an object `moves`, even if its pose rests.
+  std::shared_ptr<const Deformation> deformation{};
 };
 
 /// A scene for renderers of triangles.

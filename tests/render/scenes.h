@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 #include <utility>
+#include <vector>
 
 #include "esim/backends/opengl/gl_renderer.h"
 #include "esim/backends/opengl/splats/gl_splat_renderer.h"
@@ -18,6 +19,7 @@
 #include "esim/backends/sprites/sprites_renderer.h"
 #include "esim/geometry/so3.h"
 #include "esim/motion/trajectory.h"
+#include "esim/render/deforming_surfaces.h"
 #include "esim/render/point_spread.h"
 
 namespace esim::test {
@@ -142,6 +144,39 @@ inline Scene plain_moving_scene() {
   return scene;
 }
 
+/// A mesh that shears to and fro, so that its flat faces remain flat.
+class Swinging final : public Deformation {
+ public:
+  Swinging(std::vector<Eigen::Vector3f> vertices, float amplitude, float frequency_hz)
+      : vertices_(std::move(vertices)), amplitude_(amplitude), frequency_hz_(frequency_hz) {}
+
+  TimeSpan span() const override { return {0, kSecond}; }
+
+  void evaluate(TimeNs t, DeformedVertices& at) const override {
+    at.positions.clear(), at.velocities.clear(), at.normals.clear();
+    const float omega = 2 * std::numbers::pi_v<float> * frequency_hz_;
+    for (const Eigen::Vector3f& vertex : vertices_) {
+      const Eigen::Vector3f reach = amplitude_ * vertex.sum() * Eigen::Vector3f(0.6F, -0.5F, 0.8F);
+      const float phase = omega * static_cast<float>(to_seconds(t));
+      at.positions.push_back(vertex + std::sin(phase) * reach);
+      at.velocities.push_back(omega * std::cos(phase) * reach);
+    }
+  }
+
+ private:
+  static constexpr TimeNs kSecond = 1'000'000'000;
+  std::vector<Eigen::Vector3f> vertices_;
+  float amplitude_, frequency_hz_;
+};
+
+/// The same as moving_scene(), with boxes that also deform.
+inline Scene deforming_scene() {
+  Scene scene = moving_scene();
+  for (SceneObject& object : scene.objects)
+    if (object.moves) object.deformation = std::make_shared<const Swinging>(object.mesh.vertices, 0.15F, 1.5F);
+  return scene;
+}
+
 /// The surfaces of a mesh with smooth_texture(), covered with flat splats on a lattice, at most `spacing` apart.
 inline Splats splats_of(const Mesh& mesh, float spacing) {
   Splats splats;
@@ -205,10 +240,23 @@ inline std::vector<Kinematics> moving_objects(double t_s) {
 inline bool has_gl() { return !gl_devices().empty(); }
 
 /// The renderers that make_renderer() makes: those of a 3D scene, and those that draw on the sensor. "moving": two
-/// objects move; "blurred": the lens blurs.
-inline constexpr std::array kRenderersOfSpace = {
-    "panorama",  "plane",  "mesh",          "moving_mesh",      "raster",           "moving_raster",        "gl",
-    "moving_gl", "splats", "moving_splats", "moving_splats_gl", "blurred_panorama", "moving_blurred_raster"};
+/// objects move; "deforming": they also deform; "blurred": the lens blurs.
+inline constexpr std::array kRenderersOfSpace = {"panorama",
+                                                 "plane",
+                                                 "mesh",
+                                                 "moving_mesh",
+                                                 "deforming_mesh",
+                                                 "raster",
+                                                 "moving_raster",
+                                                 "deforming_raster",
+                                                 "gl",
+                                                 "moving_gl",
+                                                 "splats",
+                                                 "moving_splats",
+                                                 "moving_splats_gl",
+                                                 "blurred_panorama",
+                                                 "moving_blurred_raster",
+                                                 "deforming_blurred_raster"};
 inline constexpr std::array kRenderersOnSensor = {"sprites", "blurred_sprites"};
 
 /// Every renderer on a scene that fills the view from near the origin. Those of `gl` and `sprites` ignore `area`.
@@ -231,7 +279,9 @@ inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Ca
     return make_splat_renderer(name == "splats" ? still : moving, {}, camera, workers, kNone, area.texture);
   }
   if (name.ends_with("splats_gl")) return make_gl_splat_renderer(splat_objects(true), {}, camera, {}, area.texture);
-  const Scene scene = name.starts_with("moving") ? moving_scene() : still_scene(box_mesh());
+  const Scene scene = name.starts_with("deforming") ? deforming_scene()
+                      : name.starts_with("moving")  ? moving_scene()
+                                                    : still_scene(box_mesh());
   if (name.ends_with("gl")) return make_gl_renderer(scene, {}, camera);
   if (name.ends_with("raster"))
     return make_raster_renderer(build_raster_scene(scene), {}, camera, workers, kNone, area);
@@ -240,7 +290,40 @@ inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Ca
 
 /// The moving objects of that scene.
 inline std::vector<Kinematics> objects_of(const std::string& name, double t_s = 0) {
-  return name.starts_with("moving") ? moving_objects(t_s) : std::vector<Kinematics>();
+  const bool moving = name.starts_with("moving") || name.starts_with("deforming");
+  return moving ? moving_objects(t_s) : std::vector<Kinematics>();
+}
+
+/// The surfaces of a scene in which all moving objects deform, by evaluating one point after the other.
+class DeformingSurfacesOf final : public DeformingSurfaces {
+ public:
+  explicit DeformingSurfacesOf(const Scene& scene) : scene_(scene) {}
+
+  bool deforms(std::size_t object) const override { return object > 0; }
+
+  void locate(std::size_t object, TimeNs t, std::span<const SurfacePoint> points,
+              std::span<Eigen::Vector3f> positions) const override {
+    std::size_t moving = 0;
+    for (const SceneObject& candidate : scene_.objects) {
+      if (!candidate.moves || ++moving != object) continue;
+      DeformedVertices at;
+      candidate.deformation->evaluate(t, at);
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const auto& [a, b, c] = candidate.mesh.triangles[points[i].triangle];
+        const float first = 1 - points[i].b1 - points[i].b2;
+        positions[i] = first * at.positions[a] + points[i].b1 * at.positions[b] + points[i].b2 * at.positions[c];
+      }
+    }
+  }
+
+ private:
+  Scene scene_;
+};
+
+/// How the objects of that scene deform; null if they are rigid.
+inline std::shared_ptr<const DeformingSurfaces> deforming_surfaces_of(const std::string& name) {
+  if (!name.starts_with("deforming")) return nullptr;
+  return std::make_shared<const DeformingSurfacesOf>(deforming_scene());
 }
 
 /// A camera with strong distortion of each kind, 120 x 90.

@@ -1,5 +1,5 @@
 // Testing rays against the few triangles that a cell of the image may see: the same hits as by Embree, and no holes.
-#include "esim/backends/raycast/triangle_tree.h"
+#include "esim/backends/raycast/triangles/triangle_tree.h"
 
 #include <gtest/gtest.h>
 

@@ -50,7 +50,7 @@ class EveryRendererOfSpace : public test::EveryRenderer {
 
   /// From now to `dt` seconds later.
   OpticalFlowImages optical_flow(double dt) const {
-    OpticalFlowFromDepth field(model_, test::two_threads());
+    OpticalFlowFromDepth field(model_, test::deforming_surfaces_of(name_), test::two_threads());
     EXPECT_EQ(field.advance(view(0), render(0)), nullptr);
     return *field.advance(view(dt), render(dt));
   }
@@ -158,7 +158,7 @@ class WallAndCard : public testing::TestWithParam<int> {
   }
 
   OpticalFlowImages optical_flow(const RenderRequest& from, const RenderRequest& to) const {
-    OpticalFlowFromDepth field(model_, test::two_threads());
+    OpticalFlowFromDepth field(model_, nullptr, test::two_threads());
     Sample sample;
     renderer_->render(from, sample);
     field.advance(from, sample);

@@ -6,6 +6,7 @@
 
 #include "esim/compose/camera_renderers.h"
 #include "esim/compose/compose.h"
+#include "esim/compose/scene_surfaces.h"
 #include "esim/core/engine_error.h"
 #include "esim/formats/formats.h"
 #include "esim/sampling/make_sampler.h"
@@ -256,6 +257,7 @@ World build_motions(const Scenario& scenario, const SceneFile& scene, std::share
     }
   } else {
     world.objects = build_object_trajectories(scenario, scene, *world.trajectory, span, notices);
+    world.deforming = deforming_surfaces(scene.scene);
     name_what_moves(scenario.renderer, scene, world.info);
   }
   return world;

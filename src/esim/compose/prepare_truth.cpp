@@ -90,7 +90,8 @@ void prepare_truth(const Scenario& scenario, const SceneFile& scene, const Rende
   for (std::size_t i = 0; i < world.cameras.size(); ++i) {
     CameraChannel& camera = world.cameras[i];
     const Camera& model = world.info.cameras[i].model;
-    if (truth.optical_flow) camera.optical_flow = std::make_unique<OpticalFlowFromDepth>(model, *world.workers);
+    if (truth.optical_flow)
+      camera.optical_flow = std::make_unique<OpticalFlowFromDepth>(model, world.deforming, *world.workers);
     if (truth.event_points && !camera.event_sensors.empty()) {
       camera.event_points = std::make_unique<EventPoints>(model, make_pixel_renderer, view_at(world, i),
                                                           TimeSpan{world.info.start, world.info.end}, *world.workers);

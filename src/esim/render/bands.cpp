@@ -45,9 +45,9 @@ std::vector<std::size_t> cut_into_pieces(const std::vector<Band>& bands) {
 
 }  // namespace
 
-void prepare(std::span<const RenderRequest> requests, int width, int height, Sample& sample) {
+void prepare(std::span<const RenderRequest> requests, int width, int height, Sample& sample, bool deforms) {
   const RenderRequest& first = requests[0];
-  sample.resize(width, height, first.wants_objects());
+  sample.resize(width, height, first.wants_objects(), deforms);
   if (first.objects.empty()) sample.object.fill(0);
   sample.t = first.t;
   sample.tiles = first.tiles;
@@ -66,8 +66,9 @@ void render_in_bands(std::span<const RenderRequest> requests, const PixelRays& r
 }
 
 void render_in_bands(std::span<const RenderRequest> requests, int width, int height, const Workers& workers,
-                     Sample& sample, const std::function<void(std::size_t which, const Tile& band)>& shade) {
-  prepare(requests, width, height, sample);
+                     Sample& sample, const std::function<void(std::size_t which, const Tile& band)>& shade,
+                     bool deforms) {
+  prepare(requests, width, height, sample, deforms);
   const std::vector<Band> bands = cut_into_bands(requests);
   const std::vector<std::size_t> begins = cut_into_pieces(bands);
   workers.for_each(static_cast<int>(begins.size()) - 1, [&](int piece) {

@@ -9,8 +9,9 @@
 
 namespace esim::inline render {
 
-/// First step of every renderer: resizes `sample` and stores the request's time and tiles in it.
-void prepare(std::span<const RenderRequest> requests, int width, int height, Sample& sample);
+/// First step of every renderer: resizes `sample` and stores the request's time and tiles in it. `deforms`: it has
+/// space for points on surfaces.
+void prepare(std::span<const RenderRequest> requests, int width, int height, Sample& sample, bool deforms = false);
 
 /// Shared by renderers on the CPU: prepares `sample`, cuts the requests' tiles into bands of a few rows, and calls
 /// `shade` for each band in parallel. `shade` fills E, Z and, if the requests name objects, the visible object; V is
@@ -20,6 +21,7 @@ void render_in_bands(std::span<const RenderRequest> requests, const PixelRays& r
 
 /// As above, for a `shade` that also fills V.
 void render_in_bands(std::span<const RenderRequest> requests, int width, int height, const Workers& workers,
-                     Sample& sample, const std::function<void(std::size_t which, const Tile& band)>& shade);
+                     Sample& sample, const std::function<void(std::size_t which, const Tile& band)>& shade,
+                     bool deforms = false);
 
 }  // namespace esim::inline render

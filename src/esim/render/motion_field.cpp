@@ -71,4 +71,11 @@ void motion_field(const PixelRays& rays, const std::vector<Twist>& twists, const
   }
 }
 
+void add_to_motion_field(const PixelRays& rays, int x, int y, const Eigen::Vector3f& velocity, Sample& sample) {
+  const Eigen::Vector3f w = velocity / sample.depth(x, y);
+  const float bearing_x = w.x() - rays.x(x, y) * w.z(), bearing_y = w.y() - rays.y(x, y) * w.z();
+  sample.motion_x(x, y) += rays.du_dx(x, y) * bearing_x + rays.du_dy(x, y) * bearing_y;
+  sample.motion_y(x, y) += rays.dv_dx(x, y) * bearing_x + rays.dv_dy(x, y) * bearing_y;
+}
+
 }  // namespace esim::inline render

@@ -33,4 +33,8 @@ std::vector<Twist> relative_twists(const RenderRequest& request);
 void motion_field(const PixelRays& rays, const std::vector<Twist>& twists, const Tile& tile, Sample& sample,
                   int every = 1);
 
+/// Adds to V of a pixel that its surface moves relative to its object at `velocity` (m/s, camera frame): w of
+/// motion_field() increases by velocity / Z.
+void add_to_motion_field(const PixelRays& rays, int x, int y, const Eigen::Vector3f& velocity, Sample& sample);
+
 }  // namespace esim::inline render

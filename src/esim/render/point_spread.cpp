@@ -93,7 +93,7 @@ class BlurredRenderer::Blurring final : public Rendering {
   }
 
   void finish(Sample& sample) override {
-    prepare(requests_, renderer_.width_, renderer_.height_, sample);
+    prepare(requests_, renderer_.width_, renderer_.height_, sample, renderer_.traits().deforms);
     Sample sharp;
     for (std::size_t i = 0; i < requests_.size(); ++i) {
       renderings_[i]->finish(sharp);
@@ -149,6 +149,7 @@ void BlurredRenderer::blur(const Sample& sharp, const Tile& tile, Sample& sample
     };
     copy(sharp.depth, sample.depth), copy(sharp.motion_x, sample.motion_x), copy(sharp.motion_y, sample.motion_y);
     if (!sample.object.empty()) copy(sharp.object, sample.object);
+    if (!sample.surface.empty()) copy(sharp.surface, sample.surface);
   }
 }
 

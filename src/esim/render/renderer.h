@@ -37,6 +37,7 @@ struct RendererTraits {
   bool on_sensor = false;  ///< drawn on the sensor: the camera's pose, twist and lens have no effect
   std::string device{};    ///< that it runs on; empty for the processor
   std::string engine{};    ///< on the processor, if there are several
+  bool deforms = false;    ///< some objects deform: samples contain the points that are visible
 
   /// A name to display.
   std::string label() const {

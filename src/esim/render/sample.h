@@ -8,6 +8,12 @@
 
 namespace esim::inline render {
 
+/// A point of an object: p0 + b1 (p1 - p0) + b2 (p2 - p0) on the triangle with the corners p0, p1, p2.
+struct SurfacePoint {
+  std::uint32_t triangle = 0;  ///< of the object's mesh
+  float b1 = 0, b2 = 0;
+};
+
 /// One evaluation of the scene by one camera: a field per quantity, all of the image's size. Only the pixels in `tiles`
 /// are valid.
 struct Sample {
@@ -16,21 +22,28 @@ struct Sample {
 
   Image<float> irradiance;  // E, linear, 1.0 = white          computed by the renderer
   Image<float> depth;       // Z, planar, m; +inf: no surface  computed by the renderer
-  Image<float> motion_x;    // V, px/s, to the right           by motion_field() from Z, object and the twists, or by
-  Image<float> motion_y;    // V, px/s, downwards              the renderer if its scene is not three-dimensional
+  Image<float> motion_x;    // V, px/s, to the right           by motion_field() from Z, object and the twists, and by
+  Image<float> motion_y;    // V, px/s, downwards              the renderer if its scene deforms or is flat
 
   // The visible moving object: 0 for none, i + 1 for the i-th of the request, or of the sprites drawn on the sensor.
   // Computed by the renderer; empty unless the request wants_objects().
   Image<std::uint16_t> object;
 
+  // The point that is visible, of objects that deform; arbitrary elsewhere. Computed by the renderer; empty unless
+  // objects of its scene deform.
+  Image<SurfacePoint> surface;
+
   /// Resizes to width x height pixels; keeps the content if that is already the size.
-  void resize(int width, int height, bool with_objects = false) {
+  void resize(int width, int height, bool with_objects = false, bool with_surfaces = false) {
     if (irradiance.width() != width || irradiance.height() != height) {
       for (Image<float>* field : {&irradiance, &depth, &motion_x, &motion_y}) *field = Image<float>(width, height);
     }
     const int object_width = with_objects ? width : 0, object_height = with_objects ? height : 0;
     if (object.width() != object_width || object.height() != object_height)
       object = Image<std::uint16_t>(object_width, object_height);
+    const int surface_width = with_surfaces ? width : 0, surface_height = with_surfaces ? height : 0;
+    if (surface.width() != surface_width || surface.height() != surface_height)
+      surface = Image<SurfacePoint>(surface_width, surface_height);
   }
 };
 

@@ -13,6 +13,7 @@
 #include "esim/light/flicker.h"
 #include "esim/motion/trajectory.h"
 #include "esim/recording/record.h"
+#include "esim/render/deforming_surfaces.h"
 #include "esim/render/renderer.h"
 #include "esim/sampling/sampler.h"
 #include "esim/sim/flicker_labels.h"
@@ -64,6 +65,7 @@ struct World {
   std::unique_ptr<const Workers> workers;                  // outlives the channels
   std::shared_ptr<const Trajectory> trajectory;            // of the body
   std::vector<std::shared_ptr<const Trajectory>> objects;  // of the scene's moving objects, in its order
+  std::shared_ptr<const DeformingSurfaces> deforming;      // of those that deform; null if all are rigid
   std::vector<CameraChannel> cameras;                      // the first of info.cameras; then come event sensors
   PeriodicClock truth_clock, pose_clock;
   std::optional<ImuChannel> imu{};

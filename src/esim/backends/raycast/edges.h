@@ -23,7 +23,7 @@ struct SeenSurfaces {
 /// plane, or different light. These corners suffice: a straight edge that cuts off a part of a convex pixel separates a
 /// corner.
 template <int K>
-std::uint32_t pixels_on_edges(const RaycastScene& scene, const RayBlock& block, int first,
+std::uint32_t pixels_on_edges(const SceneTriangles& scene, const RayBlock& block, int first,
                               const SeenSurfaces<K>& centre, const SeenSurfaces<K>& corner) {
   constexpr float kTurned = 0.9F * 0.9F, kApart = 0.125F, kOtherLight = 0.9F;
   const auto &ray0 = centre.packet.ray.ray, &ray1 = corner.packet.ray.ray;

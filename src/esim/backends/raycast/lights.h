@@ -1,5 +1,7 @@
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <optional>
 
 #include "esim/backends/raycast/surface.h"
@@ -15,6 +17,24 @@ inline Lighting in_camera_frame(Lighting lighting, const PlacedGroup& world) {
   return lighting;
 }
 
+/// Whether a ray meets a box before `reach` times its direction.
+inline bool ray_may_meet(const Eigen::AlignedBox3f& box, const Eigen::Vector3f& origin,
+                         const Eigen::Vector3f& direction, float reach) {
+  constexpr float kRounding = 1e-5F;
+  const float margin = kRounding * (origin.lpNorm<1>() + box.sizes().sum());
+  float enters = 0, leaves = reach;
+  for (int axis = 0; axis < 3; ++axis) {
+    const float low = box.min()[axis] - margin - origin[axis], high = box.max()[axis] + margin - origin[axis];
+    if (direction[axis] == 0) {
+      if (low > 0 || high < 0) return false;
+      continue;
+    }
+    const float a = low / direction[axis], b = high / direction[axis];
+    enters = std::max(enters, std::min(a, b)), leaves = std::min(leaves, std::max(a, b));
+  }
+  return enters <= leaves;
+}
+
 /// A vector per lane.
 template <int K>
 struct VectorLanes {
@@ -28,7 +48,7 @@ struct SurfacePoints {
   VectorLanes<K> point, triangle_normal, normal;
 
   /// Takes the points that the packet has hit; undefined in lanes without a hit.
-  void take(const RaycastScene& scene, const Packet<K>& packet, const std::array<std::uint32_t, K>& triangles,
+  void take(const SceneTriangles& scene, const Packet<K>& packet, const std::array<std::uint32_t, K>& triangles,
             const GroupRotations<K>& rotations) {
     normal = normals_of(scene, packet, triangles);
     const auto& R = rotations.element;
@@ -57,7 +77,7 @@ struct SurfacePoints {
 
  private:
   /// Normals of any length and on either side, in the frames of the hit groups.
-  static VectorLanes<K> normals_of(const RaycastScene& scene, const Packet<K>& packet,
+  static VectorLanes<K> normals_of(const SceneTriangles& scene, const Packet<K>& packet,
                                    const std::array<std::uint32_t, K>& triangles) {
     const auto& hit = packet.ray.hit;
     VectorLanes<K> normals;
@@ -139,9 +159,24 @@ class LightOnSurfaces {
       start.z[i] = z + gap * surface.triangle_normal.z[i];
     }
     for (const PlacedGroup& group : groups_) {
-      if (lanes != 0 && group.triangles != nullptr) lanes &= ~occluded(group, start, to_light, reach, lanes);
+      if (lanes == 0) break;
+      if (group.deforming != nullptr && !may_meet(group, start, to_light, reach, lanes)) continue;
+      if (group.triangles().rays.scene() != nullptr) lanes &= ~occluded(group, start, to_light, reach, lanes);
     }
     return lanes;
+  }
+
+  /// Whether any of the rays of `lanes` may meet the group's box.
+  static bool may_meet(const PlacedGroup& group, const VectorLanes<K>& start, const VectorLanes<K>& to_light,
+                       float reach, std::uint32_t lanes) {
+    for (; lanes != 0; lanes &= lanes - 1) {
+      const auto i = static_cast<std::size_t>(std::countr_zero(lanes));
+      const Eigen::Vector3f from(start.x[i], start.y[i], start.z[i]),
+          along(to_light.x[i], to_light.y[i], to_light.z[i]);
+      if (ray_may_meet(group.box, group.camera + group.R_group_camera * from, group.R_group_camera * along, reach))
+        return true;
+    }
+    return false;
   }
 
   /// Those of `lanes` whose rays meet a triangle of the group.
@@ -162,7 +197,7 @@ class LightOnSurfaces {
       ray.tnear[i] = 0, ray.tfar[i] = reach, ray.time[i] = 0;
       ray.mask[i] = ~0U, ray.id[i] = 0, ray.flags[i] = 0;
     }
-    embree::occlude<K>(wanted.data(), group.triangles, ray);
+    embree::occlude<K>(wanted.data(), group.triangles().rays.scene(), ray);
     std::uint32_t found = 0;
     for (unsigned i = 0; i < K; ++i) found |= (ray.tfar[i] < 0 ? 1U : 0U) << i;  // Embree's mark of a hit
     return found;

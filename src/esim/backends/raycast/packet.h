@@ -114,7 +114,7 @@ void Packet<K>::intersect(const PlacedGroup& placed, unsigned group) {
     ray.ray.id[i] = 0;
     ray.ray.flags[i] = 0;
   }
-  embree::intersect<K>(kAllLanes<K>.valid.data(), placed.triangles, group, ray);
+  embree::intersect<K>(kAllLanes<K>.valid.data(), placed.triangles().rays.scene(), group, ray);
 }
 
 template <int K>

@@ -88,14 +88,17 @@ class RaycastRenderer final : public ProcessorRenderer {
   }
 
   RendererTraits traits() const override {
-    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false, .engine = "raycast"};
+    return {.name = "mesh",
+            .granularity = Granularity::tile,
+            .at_infinity = false,
+            .engine = "raycast",
+            .deforms = scene_->deforms()};
   }
 
  private:
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
-    const std::vector<Moment> moments = moments_of(*scene_, requests);
-    render_in_bands(requests, rays_, workers_, sample, [&](std::size_t which, const Tile& band) {
-      scene_->with_packet_size([&](auto K) { render_band<K.value>(moments[which], band, sample); });
+    render_moments(*scene_, requests, rays_, workers_, sample, [&](const Moment& moment, const Tile& band) {
+      scene_->with_packet_size([&](auto K) { render_band<K.value>(moment, band, sample); });
     });
   }
 
@@ -136,10 +139,10 @@ class RaycastRenderer final : public ProcessorRenderer {
     for (std::size_t i = 0; i < views.size(); ++i) {
       const PlacedGroup& placed = moment.groups[i];
       CellView& view = views[i];
-      view.any = placed.triangles != nullptr && placed.bounds.overlap(cell);
+      view.any = placed.bounds.overlap(cell) && placed.triangles().rays.scene() != nullptr;
       if (!view.any) continue;
       const std::size_t first = seen.size();
-      view.few = placed.tree->find(cell, placed.R_group_camera, placed.camera, seen);
+      view.few = placed.triangles().tree.find(cell, placed.R_group_camera, placed.camera, seen);
       if (!view.few) seen.shrink(first);
       view.triangles = seen.from(first);
     }
@@ -149,7 +152,7 @@ class RaycastRenderer final : public ProcessorRenderer {
   void render_batch(const Moment& moment, std::span<const CellView> views, std::span<Work<K>> batch, const Tile& band,
                     Sample& sample) const {
     for (Work<K>& work : batch) trace(moment, views, {0, 0}, work.rays);
-    for (Work<K>& work : batch) store_geometry(work, band, sample);
+    for (Work<K>& work : batch) store_geometry(moment, work, band, sample);
     shading_.shade<K>(moment, batch, 1);
     if (places_.size() > 1) smooth_edges<K>(moment, views, batch);
     for (Work<K>& work : batch) store(work, work.rays.irradiance.data(), band, sample.irradiance);
@@ -194,7 +197,7 @@ class RaycastRenderer final : public ProcessorRenderer {
       corner.light = work.rays.light;
       if (const std::uint32_t lit = corner.hits & work.rays.lit; shadows && lit != 0)
         shading_.light_up(moment, rotations, lit, corner);
-      edges |= pixels_on_edges<K>(*scene_, *corner.block, corner.first, centre,
+      edges |= pixels_on_edges<K>(*moment.triangles, *corner.block, corner.first, centre,
                                   {corner.packet, corner.triangle, corner.light});
     }
     return edges;
@@ -241,17 +244,24 @@ class RaycastRenderer final : public ProcessorRenderer {
     if (moment.groups.size() > 1) {
       for (unsigned i = 0; i < K; ++i) rays.triangle[i] += scene_->first_triangle(rays.packet.group(i));
     }
-    for (const std::uint32_t triangle : rays.triangle) __builtin_prefetch(&scene_->triangle(triangle));
+    for (const std::uint32_t triangle : rays.triangle) __builtin_prefetch(&moment.triangles->triangle(triangle));
   }
 
   template <int K>
-  static void store_geometry(const Work<K>& work, const Tile& band, Sample& sample) {
+  static void store_geometry(const Moment& moment, const Work<K>& work, const Tile& band, Sample& sample) {
     const Packet<K>& packet = work.rays.packet;
     store(work, packet.ray.ray.tfar, band, sample.depth);
     if (sample.object.empty()) return;
     std::array<std::uint16_t, K> objects;
     for (unsigned i = 0; i < K; ++i) objects[i] = static_cast<std::uint16_t>(packet.group(i));
     store(work, objects.data(), band, sample.object);
+    if (sample.surface.empty()) return;
+    std::array<SurfacePoint, K> points;
+    for (unsigned i = 0; i < K; ++i) {
+      const std::uint32_t first = moment.groups[packet.group(i)].first_triangle;
+      points[i] = {work.rays.triangle[i] - first, packet.ray.hit.u[i], packet.ray.hit.v[i]};
+    }
+    store(work, points.data(), band, sample.surface);
   }
 
   /// For rays that are all in the pixel `lane` of a block.

@@ -6,39 +6,31 @@
 #include <type_traits>
 #include <vector>
 
-#include "esim/backends/raycast/embree.h"
 #include "esim/backends/raycast/ray_blocks.h"
 #include "esim/backends/raycast/raycast_renderer.h"
-#include "esim/backends/raycast/triangle_tree.h"
+#include "esim/backends/raycast/triangles/deforming_group.h"
 
 // Private to backends/raycast.
 namespace esim::inline backends::inline raycast {
 
-/// A triangle's data for shading, in one cache line. Texture coordinates are uv0 + b1 uv1 + b2 uv2 (barycentric b), and
-/// have the gradients (gradient_u, gradient_v) per metre in its plane.
-struct alignas(64) TriangleShading {
-  float u0, v0, u1, v1, u2, v2;
-  float gradient_u[3], gradient_v[3];
-  std::uint32_t material;
-};
-
-struct ReleaseDevice {
-  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-};
-struct ReleaseScene {
-  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-};
-using DevicePointer = std::unique_ptr<RTCDeviceTy, ReleaseDevice>;
-using ScenePointer = std::unique_ptr<RTCSceneTy, ReleaseScene>;
-
-/// A rigid group of triangles, as a camera sees it at one time.
+/// A group of triangles, as a camera sees it at one time.
 struct PlacedGroup {
-  RTCScene triangles;        // in the group's frame, for rays; null without triangles
-  const TriangleTree* tree;  // of the same triangles
+  const GroupTriangles* rigid;              // in the group's frame; null if it deforms
+  std::unique_ptr<DeformsLater> deforming;  // null if it is rigid
   Eigen::Matrix3f R_group_camera, R_camera_group;
   Eigen::Vector3f camera;        // position of the camera in the group's frame
   BearingBounds bounds;          // contain the visible part of the group
+  Eigen::AlignedBox3f box;       // contains the group, in its frame
   std::uint32_t first_triangle;  // index in the scene
+
+  /// Its triangles, which are computed if it deforms.
+  const GroupTriangles& triangles() const { return rigid != nullptr ? *rigid : deforming->get().triangles; }
+};
+
+/// The groups of a scene at one time, and the data of their triangles.
+struct PlacedGroups {
+  std::vector<PlacedGroup> groups;
+  std::shared_ptr<SceneTriangles> triangles;
 };
 
 /// What a scene is prepared for.
@@ -47,8 +39,8 @@ enum class SceneUse {
   surfaces  ///< projecting its triangles, and rays of shadows
 };
 
-/// The triangles of a scene in rigid groups: group 0 is static, group i + 1 is the i-th moving object. Immutable, so
-/// that any number of threads can use it for any times of the scene.
+/// The triangles of a scene in groups: group 0 is static, group i + 1 is the i-th moving object. Immutable, so that any
+/// number of threads can use it for any times of the scene.
 class RaycastScene {
  public:
   explicit RaycastScene(const Scene& scene, SceneUse use = SceneUse::rays);
@@ -62,11 +54,13 @@ class RaycastScene {
   }
 
   /// The groups as a camera sees them. Throws InternalError if the request has another number of moving objects.
-  std::vector<PlacedGroup> place(const RenderRequest& request) const;
+  PlacedGroups place(const RenderRequest& request) const;
+
+  /// Whether any object deforms.
+  bool deforms() const { return deforms_; }
 
   /// Index of the first triangle of a group.
   std::uint32_t first_triangle(unsigned group) const { return groups_[group].first_triangle; }
-  const TriangleShading& triangle(std::uint32_t index) const { return triangles_[index]; }
   const Material& material(unsigned index) const { return materials_[index]; }
 
   /// Whether there are materials in each colour: then index + first_material(colour) is the material of a colour that
@@ -78,33 +72,32 @@ class RaycastScene {
 
   const std::optional<Lighting>& lighting() const { return lighting_; }
 
-  /// The normals at a triangle's corners; null or of length 0 if it is flat.
-  const std::array<Eigen::Vector3f, 3>* corner_normals(std::uint32_t index) const {
-    return index < corner_normals_.size() ? &corner_normals_[index] : nullptr;
-  }
-
  private:
   struct Group {
     std::uint32_t first_triangle;
-    ScenePointer accelerator;    // null without triangles, or if no ray is needed
-    TriangleTree tree;           // empty for rays if there are many triangles
-    Eigen::AlignedBox3f bounds;  // of its vertices
+    GroupTriangles rigid;
+    std::unique_ptr<DeformingGroup> deforming;  // null if it is rigid
+    Eigen::AlignedBox3f bounds;                 // of the vertices of a rigid group
   };
 
+  TriangleUse triangle_use(SceneUse use) const;
   void add_group(const std::vector<const Mesh*>& meshes);
-  void build_trees(const std::vector<const Mesh*>& meshes, Group& group) const;
-  void append(const Mesh& mesh);
+  void add_deforming(const SceneObject& object);
+  void append_materials(const Mesh& mesh);
   void append_colours(const std::vector<const Mesh*>& meshes);
+  std::uint32_t append_triangles(const std::vector<const Mesh*>& meshes);
 
-  SceneUse use_;
   DevicePointer device_;
-  int packet_size_ = 4;
   std::optional<Lighting> lighting_;
+  TriangleUse use_{};
+  int packet_size_ = 4;
   std::vector<Material> materials_;  // in luminance, then in each colour, if there are any
   std::size_t material_count_ = 0;   // of luminance
   std::vector<Group> groups_;
-  std::vector<TriangleShading> triangles_;                      // of all groups
-  std::vector<std::array<Eigen::Vector3f, 3>> corner_normals_;  // likewise, up to the last one that light needs
+  std::vector<std::vector<TriangleShading>> shading_;  // of each rigid group
+  std::vector<std::vector<CornerNormals>> normals_;    // likewise, up to the last triangle that light needs
+  std::shared_ptr<SceneTriangles> triangles_ = std::make_shared<SceneTriangles>();
+  bool deforms_ = false;
 };
 
 }  // namespace esim::inline backends::inline raycast

@@ -1,11 +1,15 @@
 #pragma once
 
 #include <array>
+#include <memory>
 #include <optional>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "esim/backends/raycast/lights.h"
+#include "esim/render/bands.h"
+#include "esim/render/motion_field.h"
 
 // Private to backends/raycast.
 /// From what rays have hit to irradiance.
@@ -14,18 +18,49 @@ namespace esim::inline backends::inline raycast {
 /// The scene at one time, seen from one pose.
 struct Moment {
   std::vector<PlacedGroup> groups;
+  std::shared_ptr<const SceneTriangles> triangles;
   std::optional<Lighting> lighting;  // in the camera frame
 
-  Moment(const RaycastScene& scene, const RenderRequest& request)
-      : groups(scene.place(request)), lighting(scene.lighting()) {
+  Moment(const RaycastScene& scene, const RenderRequest& request) : lighting(scene.lighting()) {
+    PlacedGroups placed = scene.place(request);
+    groups = std::move(placed.groups), triangles = std::move(placed.triangles);
     if (lighting) lighting = in_camera_frame(*lighting, groups[0]);
   }
 };
+
+/// Adds to V how the surfaces of deforming objects move in the objects' frames.
+inline void add_deformation(const Moment& moment, const PixelRays& rays, const Tile& tile, int every, Sample& sample) {
+  const int first = (tile.y + every - 1) / every * every;
+  for (int y = first; y < tile.y + tile.height; y += every) {
+    for (int x = tile.x; x < tile.x + tile.width; ++x) {
+      const PlacedGroup& group = moment.groups[sample.object(x, y)];
+      if (group.deforming == nullptr) continue;
+      const Eigen::Vector3f velocity = group.deforming->velocity(sample.surface(x, y));
+      add_to_motion_field(rays, x, y, group.R_camera_group * velocity, sample);
+    }
+  }
+}
 
 inline std::vector<Moment> moments_of(const RaycastScene& scene, std::span<const RenderRequest> requests) {
   std::vector<Moment> moments;
   for (const RenderRequest& request : requests) moments.emplace_back(scene, request);
   return moments;
+}
+
+/// Renders in bands, and fills V; `shade` fills all other fields.
+template <class Shade>
+void render_moments(const RaycastScene& scene, std::span<const RenderRequest> requests, const PixelRays& rays,
+                    const Workers& workers, Sample& sample, const Shade& shade) {
+  const std::vector<Moment> moments = moments_of(scene, requests);
+  std::vector<std::vector<Twist>> twists;
+  for (const RenderRequest& request : requests) twists.push_back(relative_twists(request));
+  const auto render = [&](std::size_t which, const Tile& band) {
+    shade(moments[which], band);
+    const int every = requests[which].motion_rows;
+    motion_field(rays, twists[which], band, sample, every);
+    if (scene.deforms()) add_deformation(moments[which], rays, band, every, sample);
+  };
+  render_in_bands(requests, rays.x.width(), rays.x.height(), workers, sample, render, scene.deforms());
 }
 
 /// K rays in the stages of rendering.
@@ -65,7 +100,7 @@ class Shading {
   void light_up(const Moment& moment, GroupRotations<K>& rotations, std::uint32_t lit, Rays<K>& rays) const {
     rotations.select(rays.packet, moment.groups);
     SurfacePoints<K> surface;
-    surface.take(scene_, rays.packet, rays.triangle, rotations);
+    surface.take(*moment.triangles, rays.packet, rays.triangle, rotations);
     const std::array<float, K> light = LightOnSurfaces<K>(*moment.lighting, moment.groups).at(surface, lit);
     for (unsigned i = 0; i < K; ++i) rays.light[i] = (lit >> i & 1U) != 0 ? light[i] : rays.light[i];
   }
@@ -75,7 +110,7 @@ class Shading {
   void locate(const Moment& moment, GroupRotations<K>& rotations, float footprint, Rays<K>& rays) const {
     if (rays.hits == 0) return;
     HitTriangles<K> triangles;
-    triangles.gather(scene_, rays.triangle);
+    triangles.gather(*moment.triangles, rays.triangle);
     rotations.select(rays.packet, moment.groups);
     locate_on_textures<K>(rays.packet, *rays.block, rays.first, footprint, rotations, triangles, rays.at);
     rays.material = triangles.material;

@@ -42,7 +42,7 @@ struct HitTriangles {
   alignas(64) std::array<float, K> ux, uy, uz, vx, vy, vz;
   alignas(64) std::array<std::uint32_t, K> material;
 
-  void gather(const RaycastScene& scene, const std::array<std::uint32_t, K>& indices) {
+  void gather(const SceneTriangles& scene, const std::array<std::uint32_t, K>& indices) {
     std::array<const TriangleShading*, K> triangles;
     for (unsigned i = 0; i < K; ++i) {
       triangles[i] = &scene.triangle(indices[i]);

@@ -152,7 +152,7 @@ std::vector<Sequence> ScenarioSequences::make_all(std::uint32_t rendering) const
   const TimeNs start = world.info.start, end = world.info.end;
   Renderer& renderer = *world.cameras[0].renderer;
   Sample sample;
-  OpticalFlowFromDepth field(world.info.cameras[0].model, *world.workers);
+  OpticalFlowFromDepth field(world.info.cameras[0].model, world.deforming, *world.workers);
   const RenderRequest first = view(world, 0, start), last = view(world, 0, end);
   Sequence truth;
   renderer.render(first, sample);

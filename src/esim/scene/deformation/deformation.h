@@ -1,6 +1,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <vector>
 
 #include "esim/core/time.h"
@@ -25,6 +26,9 @@ class Deformation {
 
   /// Computes the vertices at `t`, and resizes the lists.
   virtual void evaluate(TimeNs t, DeformedVertices& vertices) const = 0;
+
+  /// A box that contains all vertices at `t`. An estimate may be larger than the smallest box, but never smaller.
+  virtual Eigen::AlignedBox3f bounds(TimeNs t) const;
 };
 
 }  // namespace esim::inline scene

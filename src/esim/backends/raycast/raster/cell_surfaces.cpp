@@ -44,9 +44,9 @@ void CellSurfaces::collect(const std::vector<PlacedGroup>& groups, const ImageCe
   ScreenLeaf projected;
   for (std::size_t g = 0; g < groups.size(); ++g) {
     const PlacedGroup& group = groups[g];
-    if (group.tree->empty() || !group.bounds.overlap(cell.bounds)) continue;
+    if (!group.bounds.overlap(cell.bounds)) continue;
     leaves_.clear();
-    group.tree->find(cell.bounds, group.R_group_camera, group.camera, leaves_);
+    group.triangles().tree.find(cell.bounds, group.R_group_camera, group.camera, leaves_);
     for (const auto& [leaf, met] : leaves_) {
       projected.project(*leaf, group.R_camera_group, group.camera);
       for (unsigned left = met & projected.visible; left != 0; left &= left - 1) {

@@ -41,7 +41,7 @@ SeenInMiddle Coverage::divide(const CellSurfaces& surfaces, const ImageCell& cel
   if (found.size() == 1 && found[0].fills_pixel != 0) {
     const ScreenTriangle& triangle = surfaces.triangle(found[0].triangle);
     fragments.push_back({found[0].triangle, static_cast<std::uint16_t>(pixel), {0, 0}, {}, 1, every_sample_});
-    return {triangle.inverse_depth().at(cell.x[k], cell.y[k]), triangle.group};
+    return {triangle.inverse_depth().at(cell.x[k], cell.y[k]), triangle.group, found[0].triangle};
   }
   surfaces_ = &surfaces, cell_ = &cell, pixel_ = static_cast<std::uint16_t>(pixel);
   candidates_.clear();
@@ -105,7 +105,7 @@ SeenInMiddle Coverage::look_at_middle() {
     const bool inside = local.middle[0] >= 0 && local.middle[1] >= 0 && local.middle[2] >= 0;
     if (!inside || !(z > 0) || !(z <= kMaxInverseDepth)) continue;
     if (z > seen.inverse_depth || (z == seen.inverse_depth && local.index < index))
-      seen = {z, local.group}, index = local.index;
+      seen = {z, local.group, local.triangle}, index = local.index;
   }
   return seen;
 }

@@ -34,6 +34,7 @@ struct Fragment {
 struct SeenInMiddle {
   float inverse_depth = 0;  ///< 0: nothing
   std::uint32_t group = 0;
+  std::uint32_t triangle = 0;  ///< of the cell's
 };
 
 /// Divides a pixel among the triangles that are visible in it.

@@ -75,9 +75,8 @@ class FragmentShading {
       const float y = cell.y[k] + cell.dy_du[k] * s + cell.dy_dv[k] * t;
       rays.packet.bearing_x[i] = x, rays.packet.bearing_y[i] = y;
       rays.packet.ray.ray.tfar[i] = 1 / triangle.inverse_depth().at(x, y);
-      const float w1 = triangle.weight(1).at(x, y), w2 = triangle.weight(2).at(x, y);
-      const float sum = triangle.weight(0).at(x, y) + w1 + w2, per_sum = sum > 0 ? 1 / sum : 0;
-      hit.u[i] = w1 * per_sum, hit.v[i] = w2 * per_sum;
+      const auto [b1, b2] = triangle.barycentric(x, y);
+      hit.u[i] = b1, hit.v[i] = b2;
       hit.Ng_x[i] = triangle.normal[0], hit.Ng_y[i] = triangle.normal[1], hit.Ng_z[i] = triangle.normal[2];
       hit.instID[0][i] = triangle.group;
       rays.triangle[i] = triangle.index;
@@ -91,7 +90,7 @@ class FragmentShading {
         work.first_material[i] = scene_.first_material(colour_at(column, row));
       }
     }
-    for (const std::uint32_t index : rays.triangle) __builtin_prefetch(&scene_.triangle(index));
+    for (const std::uint32_t index : rays.triangle) __builtin_prefetch(&moment_.triangles->triangle(index));
   }
 
   /// Sides of the parallelogram over which the texture of a fragment is averaged, in footprints of a complete pixel:

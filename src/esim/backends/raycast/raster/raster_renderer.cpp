@@ -26,14 +26,17 @@ class RasterRenderer final : public ProcessorRenderer {
         mosaic_(filters == ColourFilters::rggb && scene_->has_colours()) {}
 
   RendererTraits traits() const override {
-    return {.name = "mesh", .granularity = Granularity::tile, .at_infinity = false, .engine = "raster"};
+    return {.name = "mesh",
+            .granularity = Granularity::tile,
+            .at_infinity = false,
+            .engine = "raster",
+            .deforms = scene_->deforms()};
   }
 
  private:
   void compute(std::span<const RenderRequest> requests, Sample& sample) const override {
-    const std::vector<Moment> moments = moments_of(*scene_, requests);
-    render_in_bands(requests, rays_, workers_, sample, [&](std::size_t which, const Tile& band) {
-      scene_->with_packet_size([&](auto K) { render_band<K.value>(moments[which], band, sample); });
+    render_moments(*scene_, requests, rays_, workers_, sample, [&](const Moment& moment, const Tile& band) {
+      scene_->with_packet_size([&](auto K) { render_band<K.value>(moment, band, sample); });
     });
   }
 
@@ -58,12 +61,23 @@ class RasterRenderer final : public ProcessorRenderer {
             sample.depth(left + column, top + row) = seen.inverse_depth > 0 ? 1 / seen.inverse_depth : kInfinity;
             if (!sample.object.empty())
               sample.object(left + column, top + row) = static_cast<std::uint16_t>(seen.group);
+            if (!sample.surface.empty() && moment.groups[seen.group].deforming != nullptr)
+              sample.surface(left + column, top + row) = point_in_middle(moment, surfaces, cell, seen, row, column);
           }
         }
         shading.shade(surfaces, cell, fragments, mosaic_);
         add_up(shading, fragments, left, top, part, sample.irradiance);
       }
     }
+  }
+
+  /// The point of a deforming object that is seen in the middle of a pixel.
+  static SurfacePoint point_in_middle(const Moment& moment, const CellSurfaces& surfaces, const ImageCell& cell,
+                                      const SeenInMiddle& seen, int row, int column) {
+    const auto pixel = static_cast<std::size_t>(row * ImageCell::kWidth + column);
+    const ScreenTriangle& triangle = surfaces.triangle(seen.triangle);
+    const auto [b1, b2] = triangle.barycentric(cell.x[pixel], cell.y[pixel]);
+    return {triangle.index - moment.groups[seen.group].first_triangle, b1, b2};
   }
 
   /// Sums the fragments of each pixel, which are adjacent; the background fills what they leave.

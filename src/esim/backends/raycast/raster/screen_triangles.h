@@ -5,7 +5,7 @@
 #include <cstdint>
 
 #include "esim/backends/raycast/ray_blocks.h"
-#include "esim/backends/raycast/triangle_tree.h"
+#include "esim/backends/raycast/triangles/triangle_tree.h"
 
 // Private to backends/raycast.
 namespace esim::inline backends::inline raycast {
@@ -34,6 +34,13 @@ struct ScreenTriangle {
 
   OfBearing weight(std::size_t k) const { return {x[k], y[k], one[k]}; }
   OfBearing inverse_depth() const { return {x[3], y[3], one[3]}; }
+
+  /// The barycentric coordinates of the second and the third corner.
+  std::array<float, 2> barycentric(float bearing_x, float bearing_y) const {
+    const float w1 = weight(1).at(bearing_x, bearing_y), w2 = weight(2).at(bearing_x, bearing_y);
+    const float sum = weight(0).at(bearing_x, bearing_y) + w1 + w2, per_sum = sum > 0 ? 1 / sum : 0;
+    return {w1 * per_sum, w2 * per_sum};
+  }
 };
 
 /// Triangles of a leaf of a triangle tree, as a camera sees them.

@@ -69,6 +69,13 @@ class TriangleTree {
 
   bool empty() const { return nodes_.empty(); }
 
+  /// Moves the triangles, as many as before, to other vertices. The hierarchy keeps its branches, so that a tree whose
+  /// triangles have moved relative to each other is slower than a new one.
+  void refit(std::span<const Eigen::Vector3f> vertices, std::span<const std::array<std::uint32_t, 3>> triangles);
+
+  /// The sum of the areas of all boxes in proportion to that of the largest: how many of them a ray may have to test.
+  double cost() const;
+
   /// Adds the triangles that a camera may see in these bounds, in an order that depends on nothing else. False if they
   /// do not all fit, or if there is no tree.
   bool find(const BearingBounds& bounds, const Eigen::Matrix3f& R_tree_camera, const Eigen::Vector3f& camera,
@@ -84,11 +91,24 @@ class TriangleTree {
     std::array<Lanes, 3> middle, half;
     std::array<std::uint32_t, kWide> child;  // in nodes_; or kLeaf, a leaf's last lane, and its place in leaves_
     int count;
+
+    void set(std::size_t i, const Eigen::AlignedBox3f& box) {
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        const auto a = static_cast<Eigen::Index>(axis);
+        middle[axis][i] = box.center()[a], half[axis][i] = 0.5F * box.sizes()[a];
+      }
+    }
+    static Eigen::Vector3f at(const std::array<Lanes, 3>& lanes, std::size_t i) {
+      return {lanes[0][i], lanes[1][i], lanes[2][i]};
+    }
   };
   static constexpr std::uint32_t kLeaf = 1U << 31, kLastLane = 1U << 28;
 
   struct Pyramid;
   class Builder;
+
+  void place(Leaf& leaf, std::span<const Eigen::Vector3f> vertices,
+             std::span<const std::array<std::uint32_t, 3>> triangles) const;
 
   /// Calls visit(leaf, triangles) for every leaf with triangles in the pyramid, until it returns false.
   template <class Visit>

@@ -1,4 +1,4 @@
-#include "esim/backends/raycast/triangle_tree.h"
+#include "esim/backends/raycast/triangles/triangle_tree.h"
 
 #include <algorithm>
 #include <bit>
@@ -95,10 +95,7 @@ class TriangleTree::Builder {
     for (std::size_t i = 0; i < parts.size(); ++i) {
       Eigen::AlignedBox3f box;
       for (const Piece& piece : parts[i]) box.extend(piece.box);
-      for (std::size_t axis = 0; axis < 3; ++axis) {
-        const auto a = static_cast<Eigen::Index>(axis);
-        node.middle[axis][i] = box.center()[a], node.half[axis][i] = 0.5F * box.sizes()[a];
-      }
+      node.set(i, box);
       node.child[i] = parts[i].size() <= kWide ? add_leaf(parts[i]) : add_node(parts[i]);
     }
     tree_.nodes_[index] = node;
@@ -108,14 +105,8 @@ class TriangleTree::Builder {
  private:
   std::uint32_t add_leaf(std::span<const Piece> pieces) {
     Leaf leaf;
-    for (std::size_t i = 0; i < kWide; ++i) {
-      leaf.index[i] = pieces[std::min(i, pieces.size() - 1)].index;
-      for (std::size_t corner = 0; corner < 3; ++corner) {
-        for (std::size_t axis = 0; axis < 3; ++axis) {
-          leaf.corner[corner][axis][i] = vertices_[triangles_[leaf.index[i]][corner]][static_cast<Eigen::Index>(axis)];
-        }
-      }
-    }
+    for (std::size_t i = 0; i < kWide; ++i) leaf.index[i] = pieces[std::min(i, pieces.size() - 1)].index;
+    tree_.place(leaf, vertices_, triangles_);
     tree_.leaves_.push_back(leaf);
     const auto place = static_cast<std::uint32_t>(tree_.leaves_.size() - 1);
     if (place >= kLastLane) throw UserError("mesh: has too many triangles; use a mesh with fewer than 200 million");
@@ -140,6 +131,64 @@ TriangleTree::TriangleTree(std::span<const Vector> vertices, std::span<const std
   }
   for (const Vector& vertex : vertices) extent_ = std::max(extent_, vertex.lpNorm<Eigen::Infinity>());
   if (!pieces.empty()) Builder(*this, vertices, triangles).add_node(pieces);
+}
+
+void TriangleTree::place(Leaf& leaf, std::span<const Vector> vertices,
+                         std::span<const std::array<std::uint32_t, 3>> triangles) const {
+  for (std::size_t i = 0; i < kWide; ++i) {
+    const std::array<std::uint32_t, 3>& corners = triangles[leaf.index[i]];
+    for (std::size_t corner = 0; corner < 3; ++corner) {
+      const Vector& vertex = vertices[corners[corner]];
+      for (std::size_t axis = 0; axis < 3; ++axis)
+        leaf.corner[corner][axis][i] = vertex[static_cast<Eigen::Index>(axis)];
+    }
+  }
+}
+
+void TriangleTree::refit(std::span<const Vector> vertices, std::span<const std::array<std::uint32_t, 3>> triangles) {
+  extent_ = 0;
+  for (const Vector& vertex : vertices) extent_ = std::max(extent_, vertex.lpNorm<Eigen::Infinity>());
+  std::vector<Eigen::AlignedBox3f> leaf_boxes(leaves_.size()), node_boxes(nodes_.size());
+  for (std::size_t l = 0; l < leaves_.size(); ++l) {
+    Leaf& leaf = leaves_[l];
+    place(leaf, vertices, triangles);
+    std::array<std::array<float, 3>, 2> bounds;
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      float min = leaf.corner[0][axis][0], max = min;
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+#pragma omp simd reduction(min : min) reduction(max : max)
+        for (std::size_t i = 0; i < kWide; ++i) {
+          min = std::min(min, leaf.corner[corner][axis][i]);
+          max = std::max(max, leaf.corner[corner][axis][i]);
+        }
+      }
+      bounds[0][axis] = min, bounds[1][axis] = max;
+    }
+    leaf_boxes[l] = {Vector(bounds[0].data()), Vector(bounds[1].data())};
+  }
+  for (std::size_t n = nodes_.size(); n-- > 0;) {  // children come after their parents
+    Node& node = nodes_[n];
+    for (std::size_t i = 0; i < static_cast<std::size_t>(node.count); ++i) {
+      const std::uint32_t child = node.child[i];
+      const Eigen::AlignedBox3f& box = (child & kLeaf) != 0 ? leaf_boxes[child % kLastLane] : node_boxes[child];
+      node.set(i, box);
+      node_boxes[n].extend(box);
+    }
+  }
+}
+
+double TriangleTree::cost() const {
+  double sum = 0;
+  Eigen::AlignedBox3f all;
+  for (std::size_t n = 0; n < nodes_.size(); ++n) {
+    for (std::size_t i = 0; i < static_cast<std::size_t>(nodes_[n].count); ++i) {
+      const Vector middle = nodes_[n].at(nodes_[n].middle, i), half = nodes_[n].at(nodes_[n].half, i);
+      const Eigen::AlignedBox3f box(middle - half, middle + half);
+      sum += half_area(box);
+      if (n == 0) all.extend(box);
+    }
+  }
+  return sum > 0 ? sum / half_area(all) : 0;
 }
 
 /// The camera's view within bounds: the inner side of four planes through the camera, in the tree's frame.

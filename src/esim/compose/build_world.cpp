@@ -66,7 +66,7 @@ std::unique_ptr<Sampler> build_sampler(const Scenario& scenario, const World& wo
   const auto make_other = [&](const Camera& camera, const std::optional<PixelArea>& area) {
     return renderers.make(camera, area);
   };
-  const SceneAccess scene{model, renderer, view_at(world, index), make_other};
+  const SceneAccess scene{model, renderer, view_at(world, index), make_other, world.deforming};
   const TimeSpan span{world.info.start, world.info.end};
   try {
     return make_sampler(options.sampling, {traits, model.width, model.height, span, workers}, &scene);

@@ -23,7 +23,7 @@ class SceneSurfaces final : public DeformingSurfaces {
     return std::ranges::any_of(objects_, [](const auto& object) { return object.deformation; });
   }
 
-  bool deforms(std::size_t object) const override { return object > 0 && objects_[object - 1].deformation != nullptr; }
+  std::size_t triangle_count(std::size_t object) const override { return objects_[object - 1].triangles.size(); }
 
   void locate(std::size_t object, TimeNs t, std::span<const SurfacePoint> points,
               std::span<Eigen::Vector3f> positions) const override {

@@ -14,8 +14,8 @@ class DeformingSurfaces {
  public:
   virtual ~DeformingSurfaces() = default;
 
-  /// Whether a moving object deforms; `object` as in Sample::object.
-  virtual bool deforms(std::size_t object) const = 0;
+  /// The number of triangles of a moving object that deforms, and 0 if it is rigid; `object` as in Sample::object.
+  virtual std::size_t triangle_count(std::size_t object) const = 0;
 
   /// The positions of points of a deforming object at a time, in the object's frame, m. As many positions as points.
   virtual void locate(std::size_t object, TimeNs t, std::span<const SurfacePoint> points,

@@ -15,16 +15,15 @@ Cells::Cells(const KeyframeLayout& layout, double greatest_radius, const Workers
       workers_(workers),
       splat_(denser(layout.sensor, layout.supersampling, 0), 1, greatest_radius, workers) {}
 
-void Cells::look(const std::vector<SeenPoints>& keyframes, const RenderRequest& view, VisibleSurface& pixels) {
-  splat_.splat(keyframes, view, cells_);
+void Cells::look(const std::vector<SeenPoints>& keyframes, bool moves, VisibleSurface& pixels) {
+  splat_.splat(keyframes, moves, cells_);
   const int width = cells_.nearness.width() / s_, height = cells_.nearness.height() / s_;
-  const bool objects = !view.objects.empty();
-  pixels.resize(width, height, objects);
+  pixels.resize(width, height, moves);
   workers_.for_each(height, [&](int y) {
     for (int x = 0; x < width; ++x) {
       const Seen seen = at_centre(x, y);
       pixels.nearness(x, y) = seen.nearness;
-      if (objects) pixels.object(x, y) = seen.object;
+      if (moves) pixels.part(x, y) = seen.part;
       pixels.edge(x, y) = edge_in(x, y);
     }
   });

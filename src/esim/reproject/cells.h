@@ -18,17 +18,17 @@ class Cells {
 
   /// Projects the keyframes' dense points into the cells, and finds the surfaces at the pixels' centres: kNothing if no
   /// point falls into any of a pixel's cells. An edge crosses a pixel if it crosses one of its cells.
-  void look(const std::vector<SeenPoints>& keyframes, const RenderRequest& view, VisibleSurface& pixels);
+  void look(const std::vector<SeenPoints>& keyframes, bool moves, VisibleSurface& pixels);
 
-  /// The nearness and the object of a surface.
+  /// The nearness and the part of a surface.
   struct Seen {
     float nearness = VisibleSurface::kNothing;
-    std::uint16_t object = 0;
+    std::uint16_t part = 0;
   };
 
   /// The surface in the cell at column i and row j: kNothing if no point falls into it.
   Seen at(int i, int j) const {
-    return {cells_.nearness(i, j), cells_.object.empty() ? std::uint16_t{0} : cells_.object(i, j)};
+    return {cells_.nearness(i, j), cells_.part.empty() ? std::uint16_t{0} : cells_.part(i, j)};
   }
 
  private:

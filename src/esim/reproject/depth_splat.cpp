@@ -8,26 +8,12 @@
 
 namespace esim::inline reproject {
 
-std::vector<ViewChange> view_changes(const RenderRequest& from, const RenderRequest& to) {
-  const SE3 T_to_world = to.camera.T_world_body.inverse();
-  std::vector<ViewChange> changes;
-  const auto add = [&](const SE3& T_to_from) {
-    changes.push_back({T_to_from.rotation.toRotationMatrix().cast<float>(), T_to_from.translation.cast<float>()});
-  };
-  add(T_to_world * from.camera.T_world_body);
-  for (std::size_t i = 0; i < from.objects.size(); ++i) {
-    const SE3 T_then_now = to.objects[i].T_world_body * from.objects[i].T_world_body.inverse();
-    add(T_to_world * T_then_now * from.camera.T_world_body);
-  }
-  return changes;
-}
-
-void VisibleSurface::resize(int width, int height, bool objects) {
+void VisibleSurface::resize(int width, int height, bool moves) {
   if (nearness.width() != width || nearness.height() != height) {
     nearness = Image<float>(width, height);
     edge = Image<Edge>(width, height);
   }
-  if (objects && object.bounds() != nearness.bounds()) object = Image<std::uint16_t>(width, height);
+  if (moves && part.bounds() != nearness.bounds()) part = Image<std::uint16_t>(width, height);
 }
 
 DepthSplat::DepthSplat(Camera camera, int scale, double greatest_radius, const Workers& workers)
@@ -44,7 +30,7 @@ void DepthSplat::resize(int points) {
 
 /// Projects the points [begin, end); `begin` must be the first of a chunk.
 void DepthSplat::throw_run(const SurfacePoints& points, const std::vector<ViewChange>& changes, int begin, int end) {
-  const std::uint16_t* const object = points.object.empty() ? nullptr : points.object.data();
+  const std::uint16_t* const part = points.part.empty() ? nullptr : points.part.data();
   const float *const bx = points.x.data(), *const by = points.y.data(), *const w = points.nearness.data();
   float *const column_at = column_.data(), *const row_at = row_.data(), *const inverse_z = inverse_z_.data();
 
@@ -52,10 +38,10 @@ void DepthSplat::throw_run(const SurfacePoints& points, const std::vector<ViewCh
       [&](const auto& model) {
         const Projector project(camera_, model, greatest_radius_);
         for (int first = begin; first < end;) {
-          // Consecutive points of the same object.
-          int last = object == nullptr ? end : first + 1;
-          while (last < end && object[last] == object[first]) ++last;
-          const ViewChange c = changes[object == nullptr ? 0 : object[first]];
+          // Consecutive points of the same part.
+          int last = part == nullptr ? end : first + 1;
+          while (last < end && part[last] == part[first]) ++last;
+          const ViewChange c = changes[part == nullptr ? 0 : part[first]];
           const float r00 = c.R(0, 0), r01 = c.R(0, 1), r02 = c.R(0, 2), r10 = c.R(1, 0), r11 = c.R(1, 1),
                       r12 = c.R(1, 2), r20 = c.R(2, 0), r21 = c.R(2, 1), r22 = c.R(2, 2);
           const float t0 = c.t.x(), t1 = c.t.y(), t2 = c.t.z();
@@ -85,7 +71,7 @@ void DepthSplat::throw_run(const SurfacePoints& points, const std::vector<ViewCh
 /// Fills the rows [begin, end) of the surface.
 void DepthSplat::collect(const SurfacePoints& points, int begin, int end, VisibleSurface& surface) const {
   const int width = surface.nearness.width();
-  const bool objects = !points.object.empty();
+  const bool moves = !points.part.empty();
   const auto low = static_cast<float>(begin - 1), high = static_cast<float>(end);
   for (std::size_t chunk = 0; chunk < first_row_.size(); ++chunk) {
     if (!(last_row_[chunk] > low && first_row_[chunk] < high)) continue;
@@ -97,14 +83,14 @@ void DepthSplat::collect(const SurfacePoints& points, int begin, int end, Visibl
       const float du = scale_ * (static_cast<float>(left) - u), dv = scale_ * (static_cast<float>(top) - v);
       const float inverse_z = inverse_z_[i], slope_x = points.slope_x[i], slope_y = points.slope_y[i];
       const float here = points.nearness[i] + slope_x * du + slope_y * dv;
-      const std::uint16_t object = objects ? points.object[i] : 0;
+      const std::uint16_t part = moves ? points.part[i] : 0;
       const auto put = [&](int column, int line, float w) {
         if (column < 0 || column >= width || line < begin || line >= end) return;
         float& there = surface.nearness(column, line);
         const float nearness = std::max(0.0F, w * inverse_z);
         if (!(nearness > there)) return;
         there = nearness;
-        if (objects) surface.object(column, line) = object;
+        if (moves) surface.part(column, line) = part;
         // An outline marks all pixels that its point covers, a crease only the pixel of its point.
         const auto apart = [](int a, float b) { return std::fabs(static_cast<float>(a) - b) > 0.5F; };
         const bool beside = points.edge[i] == Edge::crease && (apart(column, u) || apart(line, v));
@@ -118,19 +104,17 @@ void DepthSplat::collect(const SurfacePoints& points, int begin, int end, Visibl
   }
 }
 
-void DepthSplat::splat(const std::vector<SeenPoints>& keyframes, const RenderRequest& view, VisibleSurface& surface) {
+void DepthSplat::splat(const std::vector<SeenPoints>& keyframes, bool moves, VisibleSurface& surface) {
   const int width = camera_.width, height = camera_.height;
-  const bool objects = !view.objects.empty();
-  surface.resize(width, height, objects);
+  surface.resize(width, height, moves);
   surface.nearness.fill(VisibleSurface::kNothing);
   surface.edge.fill(Edge::none);
-  if (objects) surface.object.fill(0);
+  if (moves) surface.part.fill(0);
   for (const SeenPoints& keyframe : keyframes) {
     const SurfacePoints& points = keyframe.points;
-    const std::vector<ViewChange> changes = view_changes(keyframe.view, view);
     resize(points.size());
     workers_.for_each((points.size() + kRun - 1) / kRun, [&](int run) {
-      throw_run(points, changes, run * kRun, std::min(points.size(), (run + 1) * kRun));
+      throw_run(points, keyframe.changes, run * kRun, std::min(points.size(), (run + 1) * kRun));
     });
     workers_.for_each((height + kBandRows - 1) / kBandRows, [&](int band) {
       collect(points, band * kBandRows, std::min(height, (band + 1) * kBandRows), surface);

@@ -6,35 +6,26 @@
 #include "esim/core/image.h"
 #include "esim/core/parallel.h"
 #include "esim/reproject/keyframe.h"
+#include "esim/reproject/parts.h"
 
 namespace esim::inline reproject {
 
-/// Transforms points from one view to another: for a bearing b and a nearness w = 1/Z in the first view, y = R b + w t
-/// is the point in the second view divided by Z; it appears at y / y_z with the nearness w / y_z. w = 0 is infinity.
-struct ViewChange {
-  Eigen::Matrix3f R;
-  Eigen::Vector3f t;
-};
-
-/// The changes from view `from` to view `to`: [0] for the static scene, [i + 1] for object i.
-std::vector<ViewChange> view_changes(const RenderRequest& from, const RenderRequest& to);
-
 /// The surfaces that a view sees of the keyframes' points.
 struct VisibleSurface {
-  Image<float> nearness;        ///< 1/Z in the view; kNothing without a point
-  Image<std::uint16_t> object;  ///< as in SurfacePoints; not current if nothing moves
-  Image<Edge> edge;             ///< as in SurfacePoints; a crease marks only the pixel of its point
+  Image<float> nearness;      ///< 1/Z in the view; kNothing without a point
+  Image<std::uint16_t> part;  ///< as in SurfacePoints; not current if nothing moves
+  Image<Edge> edge;           ///< as in SurfacePoints; a crease marks only the pixel of its point
 
   static constexpr float kNothing = -1.0F;
 
-  /// Adapts the images to a view; `objects`: something moves in it.
-  void resize(int width, int height, bool objects);
+  /// Adapts the images to a view; `moves`: something moves in it.
+  void resize(int width, int height, bool moves);
 };
 
-/// Points, and the view from which they were seen.
+/// Points that were seen from another view.
 struct SeenPoints {
-  const RenderRequest& view;
   const SurfacePoints& points;
+  const std::vector<ViewChange>& changes;  ///< to this view, by part
 };
 
 /// Projects points of keyframes into a view, each onto up to four pixels around its image; the nearest point remains.
@@ -44,7 +35,8 @@ class DepthSplat {
   /// that its lens maps.
   DepthSplat(Camera camera, int scale, double greatest_radius, const Workers& workers);
 
-  void splat(const std::vector<SeenPoints>& keyframes, const RenderRequest& view, VisibleSurface& surface);
+  /// `moves`: anything moves but the camera.
+  void splat(const std::vector<SeenPoints>& keyframes, bool moves, VisibleSurface& surface);
 
  private:
   static constexpr int kChunk = 32;     // points that are skipped together if none falls into the rows of a thread

@@ -59,14 +59,15 @@ void to_root(Image<float>& light, const Workers& workers) {
 }
 
 /// Computes everything that follows from depth.
-void find_surfaces(const KeyframeLayout& layout, const PixelRays& rays, const Sample& sample, const Workers& workers,
-                   Keyframe& keyframe) {
+void find_surfaces(const KeyframeLayout& layout, const PixelRays& rays, const SceneParts& parts, const Sample& sample,
+                   const Workers& workers, Keyframe& keyframe) {
+  const Image<std::uint16_t> seen = parts.seen(sample);
   const Surfaces surfaces(sample.depth, layout.camera.fx, workers);
   const int width = layout.camera.width, height = layout.camera.height, s = layout.supersampling;
   keyframe.sparse = keyframe.dense = {};
   for (int y = layout.first(); y < height; y += s)
-    for (int x = layout.first(); x < width; x += s)
-      surfaces.add_point(rays, sample.object, Edge::none, x, y, keyframe.sparse);
+    for (int x = layout.first(); x < width; x += s) surfaces.add_point(rays, seen, Edge::none, x, y, keyframe.sparse);
+  keyframe.deforming = parts.deforming(seen.pixels());
   // Within this distance of an edge, the mean over a sensor pixel contains both sides of the edge.
   keyframe.wide.front = surfaces.front(s / 2 + 1);
   if (keyframe.narrow.root.empty()) return;
@@ -75,7 +76,7 @@ void find_surfaces(const KeyframeLayout& layout, const PixelRays& rays, const Sa
   for (int y = 0; y < height; ++y)
     for (int x = 0; x < width; ++x)
       if (edges(x, y) != Edge::none || (x % 2 == 0 && y % 2 == 0))
-        surfaces.add_point(rays, sample.object, edges(x, y), x, y, keyframe.dense);
+        surfaces.add_point(rays, seen, edges(x, y), x, y, keyframe.dense);
 }
 
 }  // namespace
@@ -104,8 +105,9 @@ KeyframeLayout lay_out_keyframes(const Camera& sensor, int supersampling, int ma
   return layout;
 }
 
-void prepare_keyframe(const KeyframeLayout& layout, const PixelRays& rays, bool at_infinity, RenderRequest view,
-                      const Sample& sample, KeyframeLight light, const Workers& workers, Keyframe& keyframe) {
+void prepare_keyframe(const KeyframeLayout& layout, const PixelRays& rays, const SceneParts& parts, bool at_infinity,
+                      RenderRequest view, const Sample& sample, KeyframeLight light, const Workers& workers,
+                      Keyframe& keyframe) {
   keyframe.view = std::move(view);
   keyframe.wide.offset = light.wide.empty() ? 0.5F * static_cast<float>(layout.supersampling - 1) : 0.0F;
   if (light.wide.empty()) light.wide = box_mean(light.narrow, layout.supersampling, workers);
@@ -114,7 +116,7 @@ void prepare_keyframe(const KeyframeLayout& layout, const PixelRays& rays, bool 
   to_root(keyframe.wide.root, workers);
   if (at_infinity) return;
   if (!keyframe.narrow.root.empty()) to_root(keyframe.narrow.root, workers);
-  find_surfaces(layout, rays, sample, workers, keyframe);
+  find_surfaces(layout, rays, parts, sample, workers, keyframe);
 }
 
 }  // namespace esim::inline reproject

@@ -1,10 +1,14 @@
 #pragma once
 
+#include <cstdint>
+#include <vector>
+
 #include "esim/core/image.h"
 #include "esim/core/parallel.h"
 #include "esim/geometry/camera.h"
 #include "esim/render/pixel_rays.h"
 #include "esim/render/renderer.h"
+#include "esim/reproject/parts.h"
 #include "esim/reproject/surfaces.h"
 
 namespace esim::inline reproject {
@@ -49,6 +53,8 @@ struct Keyframe {
   Light wide;    ///< each pixel is the mean over the area of a sensor pixel
   Light narrow;  ///< each pixel is the mean over its own area; may be empty
 
+  std::vector<std::uint16_t> deforming;  ///< the parts of deforming objects that it sees, in order
+
   SurfacePoints sparse;  ///< every s-th pixel of every s-th row, from KeyframeLayout::first() on
   SurfacePoints dense;  ///< all pixels at edges, and every second pixel of every second row: each point covers the four
                         ///< pixels around it; empty without `narrow`
@@ -56,7 +62,8 @@ struct Keyframe {
 
 /// Prepares a keyframe from its light, and from the depth and the objects of a sample of the whole image. `rays`: of
 /// the layout's camera.
-void prepare_keyframe(const KeyframeLayout& layout, const PixelRays& rays, bool at_infinity, RenderRequest view,
-                      const Sample& sample, KeyframeLight light, const Workers& workers, Keyframe& keyframe);
+void prepare_keyframe(const KeyframeLayout& layout, const PixelRays& rays, const SceneParts& parts, bool at_infinity,
+                      RenderRequest view, const Sample& sample, KeyframeLight light, const Workers& workers,
+                      Keyframe& keyframe);
 
 }  // namespace esim::inline reproject

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <utility>
@@ -45,20 +46,20 @@ void fill_gaps(float* nearness, int width) {
   }
 }
 
-/// Several points in a row of the view: bearings (x, y, 1), nearness and, if objects move, the object of each.
+/// Several points in a row of the view: bearings (x, y, 1), nearness and, if objects move, the part of each.
 struct RowPoints {
   const float *x, *y, *nearness;
-  const std::uint16_t* object;
+  const std::uint16_t* part;
   int count;
 };
 
-/// Calls body(begin, end, object) for each run of points on the same object.
+/// Calls body(begin, end, part) for each run of points on the same part.
 template <typename Body>
 void for_each_run(const RowPoints& points, const Body& body) {
   for (int begin = 0; begin < points.count;) {
-    int end = points.object != nullptr ? begin + 1 : points.count;
-    while (end < points.count && points.object[end] == points.object[begin]) ++end;
-    body(begin, end, points.object != nullptr ? points.object[begin] : 0);
+    int end = points.part != nullptr ? begin + 1 : points.count;
+    while (end < points.count && points.part[end] == points.part[begin]) ++end;
+    body(begin, end, points.part != nullptr ? points.part[begin] : 0);
     begin = end;
   }
 }
@@ -67,25 +68,28 @@ void for_each_run(const RowPoints& points, const Body& body) {
 
 /// Two keyframes and a view between them.
 struct Reprojector::Between {
-  Between(const Keyframe& first, const Keyframe& second, const RenderRequest& seen_from)
-      : before(first),
-        after(second),
-        view(seen_from),
-        to_before(view_changes(view, before.view)),
-        to_after(view_changes(view, after.view)),
-        share(share_of_later(before, after, view.t)) {}
+  Between(const Keyframe& first, const Keyframe& second, const RenderRequest& seen_from, const SceneParts& parts)
+      : before(first), after(second), view(seen_from), share(share_of_later(before, after, view.t)) {
+    std::vector<std::uint16_t> wanted;
+    std::set_union(before.deforming.begin(), before.deforming.end(), after.deforming.begin(), after.deforming.end(),
+                   std::back_inserter(wanted));
+    from_before = parts.changes(before.view, view, before.deforming);
+    from_after = parts.changes(after.view, view, after.deforming);
+    to_before = parts.changes(view, before.view, wanted);
+    to_after = parts.changes(view, after.view, wanted);
+  }
 
   const Keyframe &before, &after;
   const RenderRequest& view;
-  std::vector<ViewChange> to_before, to_after;
-  float share;  // weight of `after`
+  std::vector<ViewChange> from_before, from_after, to_before, to_after;  // by part
+  float share;                                                           // weight of `after`
 
   template <typename Model>
   void project(const Projector<Model>& project, const RowPoints& points, RowLookup& in_before,
                RowLookup& in_after) const {
-    for_each_run(points, [&](int begin, int end, std::size_t object) {
-      project_row(project, to_before[object], points.x, points.y, points.nearness, begin, end, in_before);
-      project_row(project, to_after[object], points.x, points.y, points.nearness, begin, end, in_after);
+    for_each_run(points, [&](int begin, int end, std::size_t part) {
+      project_row(project, to_before[part], points.x, points.y, points.nearness, begin, end, in_before);
+      project_row(project, to_after[part], points.x, points.y, points.nearness, begin, end, in_after);
     });
   }
 
@@ -98,8 +102,9 @@ struct Reprojector::Between {
   }
 };
 
-Reprojector::Reprojector(const KeyframeLayout& layout, bool at_infinity, const Workers& workers)
+Reprojector::Reprojector(const KeyframeLayout& layout, bool at_infinity, const Workers& workers, SceneParts parts)
     : layout_(layout),
+      parts_(std::move(parts)),
       at_infinity_(at_infinity),
       rays_(layout.sensor),
       keyframe_rays_(layout.camera),
@@ -111,7 +116,7 @@ Reprojector::Reprojector(const KeyframeLayout& layout, bool at_infinity, const W
 }
 
 void Reprojector::prepare(RenderRequest view, const Sample& sample, KeyframeLight light, Keyframe& keyframe) const {
-  prepare_keyframe(layout_, keyframe_rays_, at_infinity_, std::move(view), sample, std::move(light), workers_,
+  prepare_keyframe(layout_, keyframe_rays_, parts_, at_infinity_, std::move(view), sample, std::move(light), workers_,
                    keyframe);
 }
 
@@ -124,12 +129,13 @@ void Reprojector::reconstruct(const Keyframe& before, const Keyframe& after, con
   fit(result.irradiance);
   if (detail == Detail::apart) fit(result.from_before), fit(result.from_after);
   const bool closely = detail == Detail::whole && before.dense.size() + after.dense.size() > 0;
+  const Between between(before, after, view, parts_);
+  const bool moves = !view.objects.empty();
   if (closely) {
-    cells_.look({{before.view, before.dense}, {after.view, after.dense}}, view, surface_);
+    cells_.look({{before.dense, between.from_before}, {after.dense, between.from_after}}, moves, surface_);
   } else if (!at_infinity_) {
-    splat_.splat({{before.view, before.sparse}, {after.view, after.sparse}}, view, surface_);
+    splat_.splat({{before.sparse, between.from_before}, {after.sparse, between.from_after}}, moves, surface_);
   }
-  const Between between(before, after, view);
   std::visit(
       [&](const auto& model) {
         look_up(between, model, detail, result);
@@ -149,8 +155,8 @@ void Reprojector::look_up(const Between& between, const Model& model, Detail det
     RowLookup row0(static_cast<std::size_t>(width)), row1(static_cast<std::size_t>(width));
     float* const w = surface_.nearness.row(y);
     fill_gaps(w, width);
-    between.project(project, {rays_.x.row(y), rays_.y.row(y), w, objects ? surface_.object.row(y) : nullptr, width},
-                    row0, row1);
+    between.project(project, {rays_.x.row(y), rays_.y.row(y), w, objects ? surface_.part.row(y) : nullptr, width}, row0,
+                    row1);
     const auto look = [&](const Keyframe& keyframe, RowLookup& row) {
       at_infinity_ ? look_up_row<false>(keyframe.wide, row) : look_up_row<true>(keyframe.wide, row);
     };
@@ -187,7 +193,7 @@ void Reprojector::refine(const Between& between, const Model& model, Reconstruct
     for (int x = 0; x < layout_.sensor.width; ++x)
       if (surface_.edge(x, y) != Edge::none) pixels.push_back(x);
     std::vector<float> bx, by, w;
-    std::vector<std::uint16_t> object;
+    std::vector<std::uint16_t> part;
     for (const int x : pixels) {
       for (int j = s * y; j < s * (y + 1); ++j) {
         for (int i = s * x; i < s * (x + 1); ++i) {
@@ -196,14 +202,14 @@ void Reprojector::refine(const Between& between, const Model& model, Reconstruct
           const Cells::Seen seen = cells_.at(i, j);
           const bool nothing = seen.nearness < 0;  // no point falls into the cell
           w.push_back(nothing ? surface_.nearness(x, y) : seen.nearness);
-          if (objects) object.push_back(nothing ? surface_.object(x, y) : seen.object);
+          if (objects) part.push_back(nothing ? surface_.part(x, y) : seen.part);
         }
       }
     }
     RowLookup row0(w.size()), row1(w.size());
     between.project(project,
-                    {bx.data(), by.data(), w.data(), objects ? object.data() : nullptr, static_cast<int>(w.size())},
-                    row0, row1);
+                    {bx.data(), by.data(), w.data(), objects ? part.data() : nullptr, static_cast<int>(w.size())}, row0,
+                    row1);
     look_up_row<true>(between.before.narrow, row0);
     look_up_row<true>(between.after.narrow, row1);
     std::size_t i = 0;

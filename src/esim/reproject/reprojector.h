@@ -28,7 +28,7 @@ enum class Detail {
 class Reprojector {
  public:
   /// `at_infinity`: everything is infinitely far, and depth is ignored.
-  Reprojector(const KeyframeLayout& layout, bool at_infinity, const Workers& workers);
+  Reprojector(const KeyframeLayout& layout, bool at_infinity, const Workers& workers, SceneParts parts = {});
 
   Reprojector(const Reprojector&) = delete;
   Reprojector& operator=(const Reprojector&) = delete;
@@ -51,6 +51,7 @@ class Reprojector {
   void refine(const Between& between, const Model& model, Reconstruction& result);
 
   KeyframeLayout layout_;
+  SceneParts parts_;
   bool at_infinity_;
   PixelRays rays_, keyframe_rays_;
   double greatest_radius_;  // maximum radius of the keyframe's bearings

@@ -125,12 +125,12 @@ Image<Edge> Surfaces::edges() const {
   return edges;
 }
 
-void Surfaces::add_point(const PixelRays& rays, const Image<std::uint16_t>& object, Edge edge, int x, int y,
+void Surfaces::add_point(const PixelRays& rays, const Image<std::uint16_t>& part, Edge edge, int x, int y,
                          SurfacePoints& to) const {
   to.x.push_back(rays.x(x, y)), to.y.push_back(rays.y(x, y));
   to.nearness.push_back(nearness_(x, y));
   to.slope_x.push_back(slope_x_(x, y)), to.slope_y.push_back(slope_y_(x, y));
-  if (!object.empty()) to.object.push_back(object(x, y));
+  if (!part.empty()) to.part.push_back(part(x, y));
   to.edge.push_back(edge);
 }
 

@@ -21,7 +21,7 @@ struct SurfacePoints {
   std::vector<float> x, y;              ///< bearing (x, y, 1)
   std::vector<float> nearness;          ///< 1 / Z, 1/m; 0 at infinity and if Z is invalid
   std::vector<float> slope_x, slope_y;  ///< change of nearness per pixel on a smooth surface; otherwise 0
-  std::vector<std::uint16_t> object;    ///< 0: static scene, i + 1: object i; empty if nothing moves
+  std::vector<std::uint16_t> part;      ///< as in SceneParts; empty if nothing moves
   std::vector<Edge> edge;               ///< edge that crosses the pixel
 
   int size() const { return static_cast<int>(x.size()); }
@@ -40,8 +40,8 @@ class Surfaces {
   /// there once the nearer one has moved away.
   Image<Edge> edges() const;
 
-  /// Adds the point that pixel (x, y) sees along its ray; `object` as in Sample.
-  void add_point(const PixelRays& rays, const Image<std::uint16_t>& object, Edge edge, int x, int y,
+  /// Adds the point that pixel (x, y) sees along its ray; `part`: of SceneParts, by pixel.
+  void add_point(const PixelRays& rays, const Image<std::uint16_t>& part, Edge edge, int x, int y,
                  SurfacePoints& to) const;
 
  private:

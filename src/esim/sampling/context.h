@@ -7,6 +7,7 @@
 #include "esim/core/parallel.h"
 #include "esim/core/time.h"
 #include "esim/geometry/camera.h"
+#include "esim/render/deforming_surfaces.h"
 #include "esim/render/pixel_area.h"
 #include "esim/render/renderer.h"
 
@@ -37,6 +38,8 @@ struct SceneAccess {
 
   /// A renderer of the scene for another camera. With `area`, its pixels average over that; null if they cannot.
   std::function<std::unique_ptr<Renderer>(const Camera& camera, const std::optional<PixelArea>& area)> make_renderer;
+
+  std::shared_ptr<const DeformingSurfaces> deforming{};  ///< null if all objects are rigid
 };
 
 }  // namespace esim::inline sampling

@@ -117,7 +117,7 @@ void OpticalFlowFromDepth::find_displacements(const Frame& from, TimeNs to) {
   std::vector<std::size_t> pixels;
   std::vector<SurfacePoint> points;
   for (std::size_t object = 1; object <= from.view.objects.size(); ++object) {
-    if (!surfaces_->deforms(object)) continue;
+    if (surfaces_->triangle_count(object) == 0) continue;
     pixels.clear(), points.clear();
     const auto seen = from.object.pixels();
     for (std::size_t i = 0; i < seen.size(); ++i) {

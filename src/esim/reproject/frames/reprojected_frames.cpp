@@ -184,7 +184,7 @@ ReprojectedFrames::Motion ReprojectedFrames::motion_to(PosedFrame& frame) {
   }
   if (frame.motion_x.empty()) found_.reset();
   const bool has_objects = !motion.objects.empty();
-  if (other_objects || has_objects == before_.sparse.object.empty()) prepare(*last_, has_objects, before_);
+  if (other_objects || has_objects == before_.sparse.part.empty()) prepare(*last_, has_objects, before_);
   prepare(frame, has_objects, after_);
   before_.view = motion.at(then), after_.view = motion.at(now);
   return motion;
@@ -214,14 +214,14 @@ Image<float> ReprojectedFrames::steps_px(const Keyframe& from, const Keyframe& t
   std::visit(
       [&](const auto& model) {
         const Projector project(layout().camera, model, kAnywhere);
-        const auto object_at = [&](int i) {
-          return points.object.empty() ? 0U : points.object[static_cast<std::size_t>(i)];
+        const auto part_at = [&](int i) {
+          return points.part.empty() ? 0U : points.part[static_cast<std::size_t>(i)];
         };
         for (int first = 0; first < points.size();) {
           int last = first + 1;
-          while (last < points.size() && object_at(last) == object_at(first)) ++last;
+          while (last < points.size() && part_at(last) == part_at(first)) ++last;
           for (const auto& [change, row] : {std::pair{&here, &begins}, {&changes, &ends}}) {
-            project_row(project, (*change)[object_at(first)], points.x.data(), points.y.data(), points.nearness.data(),
+            project_row(project, (*change)[part_at(first)], points.x.data(), points.y.data(), points.nearness.data(),
                         first, last, *row);
           }
           first = last;

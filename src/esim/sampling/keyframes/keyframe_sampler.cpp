@@ -57,7 +57,7 @@ class KeyframeSampler final : public Sampler {
         context_(context),
         view_at_(scene.view_at),
         setup_(set_up_keyframes(options, context, scene)),
-        reprojector_(setup_.layout, scene.renderer.traits().at_infinity, context.workers),
+        reprojector_(setup_.layout, scene.renderer.traits().at_infinity, context.workers, setup_.parts),
         random_(0, Purpose::sampling_audit),
         watermark_(context.span.start) {
     statistics_.tolerance = options.tolerance;

@@ -17,7 +17,7 @@ MeasuredError measure_resampling_error(const KeyframeSetup& setup, const Samplin
   Sample sample;
   setup.renderer->render(request, sample);
   Keyframe keyframe;
-  Reprojector reprojector(layout, scene.renderer.traits().at_infinity, context.workers);
+  Reprojector reprojector(layout, scene.renderer.traits().at_infinity, context.workers, setup.parts);
   reprojector.prepare(request, sample, setup.renderer->take_light(sample), keyframe);
 
   // Turn the view so that its samples lie as far as possible from the keyframe's pixels. If s is odd, the centres of
@@ -46,9 +46,10 @@ KeyframeSetup set_up_keyframes(const KeyframeSampling& options, const SamplingCo
                                const SceneAccess& scene) {
   const double max_error = options.tolerance * context.sensor.contrast_threshold;
   const bool is_given = options.supersampling > 0;
+  const SceneParts parts(scene.deforming, scene.view_at(context.span.start).objects.size());
   for (int s = is_given ? options.supersampling : kMinSupersampling;; ++s) {
     const KeyframeLayout layout = lay_out_keyframes(scene.camera, s, options.margin_px);
-    KeyframeSetup setup{layout, std::make_unique<KeyframeRenderer>(layout, scene), {}};
+    KeyframeSetup setup{layout, std::make_unique<KeyframeRenderer>(layout, scene), parts, {}};
     setup.resampling_error = measure_resampling_error(setup, context, scene);
     if (is_given || s == kMaxSupersampling || setup.resampling_error.p99 <= max_error) return setup;
   }

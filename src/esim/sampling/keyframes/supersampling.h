@@ -17,6 +17,7 @@ constexpr int kMinSupersampling = 2, kMaxSupersampling = 4;
 struct KeyframeSetup {
   KeyframeLayout layout;
   std::unique_ptr<KeyframeRenderer> renderer;
+  SceneParts parts;
 
   /// The error of brightness that remains even if a keyframe is at the sensor's own view: a keyframe of the view at the
   /// start is interpolated halfway between its pixels, where the error is largest, and compared with the sensor's own

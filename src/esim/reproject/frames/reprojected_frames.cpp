@@ -210,7 +210,7 @@ Image<float> ReprojectedFrames::steps_px(const Keyframe& from, const Keyframe& t
   constexpr float kNowhere = -1e5F;
   const SurfacePoints& points = from.sparse;
   const std::vector<ViewChange> changes = view_changes(from.view, to.view), here = view_changes(from.view, from.view);
-  RowLookup begins(static_cast<std::size_t>(points.size())), ends(begins.u.size());
+  RowLookup begins(static_cast<std::size_t>(points.size())), ends(begins.count);
   std::visit(
       [&](const auto& model) {
         const Projector project(layout().camera, model, kAnywhere);

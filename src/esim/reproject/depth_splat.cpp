@@ -8,6 +8,7 @@
 
 #include "esim/core/error.h"
 #include "esim/reproject/lens.h"
+#include "esim/reproject/lookup_lanes.h"
 
 namespace esim::inline reproject {
 namespace {
@@ -110,56 +111,67 @@ void DepthSplat::collect(const SurfacePoints& points, const Projected& projected
 
 void DepthSplat::collect_chunk(const SurfacePoints& points, const Projected& projected, std::size_t first, int begin,
                                int end, Band& band) const {
-  const int count = static_cast<int>(std::min(projected.column.size() - first, std::size_t{kChunk}));
+  const std::size_t last = std::min(projected.column.size(), first + kChunk);
   const int stride = camera_.width + 2;
-  const auto low = static_cast<float>(begin - 1), high = static_cast<float>(end);
-  const auto width = static_cast<float>(camera_.width);
-  const float *const column = projected.column.data() + first, *const row = projected.row.data() + first,
-                     *const inverse_z = projected.inverse_z.data() + first;
-  const float *const nearness = points.nearness.data() + first, *const slope_x = points.slope_x.data() + first,
-                     *const slope_y = points.slope_y.data() + first;
-  const Edge* const edge = points.edge.data() + first;
-  const std::uint32_t rank = kFirstRank - (projected.before + static_cast<std::uint32_t>(first));
-  const float scale = scale_;
+  const hn::Rebind<std::uint32_t, LookupTag> whole;
+  const hn::RebindToSigned<LookupTag> integers;
+  const auto all = [](float value) { return hn::Set(kLookupTag, value); };
+  for (std::size_t i = first; i < last; i += kLookupLanes) {
+    const auto load = [&](const auto& values) { return load_some(values.data() + i, last - i); };
+    const LookupLanes column = load(projected.column), row = load(projected.row);
+    const auto inside =
+        hn::And(hn::And(hn::Gt(row, all(static_cast<float>(begin - 1))), hn::Lt(row, all(static_cast<float>(end)))),
+                hn::And(hn::Gt(column, all(-1)), hn::Lt(column, all(static_cast<float>(camera_.width)))));
+    if (hn::AllFalse(kLookupTag, inside)) continue;
 
-  // Of each point: its first place in the band or -1, and halves of the keys there, to the right, below, and right
-  // below
-  std::array<std::int32_t, kChunk> at;
-  std::array<std::array<std::uint32_t, kChunk>, 4> near, mark;
-#pragma omp simd
-  for (int i = 0; i < count; ++i) {
-    const bool inside = row[i] > low && row[i] < high && column[i] > -1 && column[i] < width;
-    const float u = inside ? column[i] : 0.0F, v = inside ? row[i] : 0.0F;
-    const float left = std::floor(u), top = std::floor(v);
-    const float du = scale * (left - u), dv = scale * (top - v);
-    const float here = nearness[i] + slope_x[i] * du + slope_y[i] * dv;
-    const auto seen = [&](bool there, float w) {
-      return there ? std::bit_cast<std::uint32_t>(std::max(0.0F, w * inverse_z[i])) : 0U;
-    };
-    at[i] = inside ? (static_cast<int>(top) - begin + 1) * stride + static_cast<int>(left) + 1 : -1;
-    near[0][i] = seen(true, here);
-    near[1][i] = seen(du < 0, here + scale * slope_x[i]);
-    near[2][i] = seen(dv < 0, here + scale * slope_y[i]);
-    near[3][i] = seen(du < 0 && dv < 0, here + scale * (slope_x[i] + slope_y[i]));
+    // The nearness at the four places around the point, of which those to the right and below may be missing
+    const LookupLanes u = hn::IfThenElseZero(inside, column), v = hn::IfThenElseZero(inside, row);
+    const LookupLanes left = hn::Floor(u), top = hn::Floor(v);
+    const LookupLanes du = hn::Mul(all(scale_), hn::Sub(left, u)), dv = hn::Mul(all(scale_), hn::Sub(top, v));
+    const LookupLanes slope_x = load(points.slope_x), slope_y = load(points.slope_y),
+                      inverse_z = load(projected.inverse_z);
+    const LookupLanes here = hn::MulAdd(slope_y, dv, hn::MulAdd(slope_x, du, load(points.nearness)));
+    const auto right = hn::Lt(du, hn::Zero(kLookupTag)), below = hn::Lt(dv, hn::Zero(kLookupTag));
+
     // An outline marks all pixels that its point covers, a crease only the pixel of its point.
-    const auto kind = static_cast<std::uint32_t>(edge[i]), key = (rank - static_cast<std::uint32_t>(i)) << kEdgeBits;
-    const bool crease = edge[i] == Edge::crease;
-    const bool after_x = std::fabs(left - u) > 0.5F, after_y = std::fabs(top - v) > 0.5F;
-    const bool before_x = std::fabs(left + 1 - u) > 0.5F, before_y = std::fabs(top + 1 - v) > 0.5F;
-    const auto marked = [&](bool there, bool beside) { return there ? key | (crease && beside ? 0U : kind) : 0U; };
-    mark[0][i] = marked(true, after_x || after_y);
-    mark[1][i] = marked(du < 0, before_x || after_y);
-    mark[2][i] = marked(dv < 0, after_x || before_y);
-    mark[3][i] = marked(du < 0 && dv < 0, before_x || before_y);
-  }
-  for (int i = 0; i < count; ++i) {
-    if (at[i] < 0) continue;
-    std::uint64_t* const there = band.data() + at[i];
-    const auto put = [&](std::uint64_t& place, int corner) {
-      place = std::max(place, std::uint64_t{near[corner][i]} << 32 | mark[corner][i]);
+    const auto edge =
+        hn::PromoteTo(whole, load_some(reinterpret_cast<const std::uint8_t*>(points.edge.data()) + i, last - i));
+    const auto crease = hn::Eq(edge, hn::Set(whole, static_cast<std::uint32_t>(Edge::crease)));
+    const auto apart = [&](LookupLanes a, LookupLanes b) { return hn::Gt(hn::Abs(hn::Sub(a, b)), all(0.5F)); };
+    const LookupLanes next_left = hn::Add(left, all(1)), next_top = hn::Add(top, all(1));
+    const auto left_apart = apart(left, u), top_apart = apart(top, v), right_apart = apart(next_left, u),
+               below_apart = apart(next_top, v);
+
+    const auto rank = static_cast<std::uint32_t>(kFirstRank - (projected.before + i));
+    const auto ranks = hn::ShiftLeft<kEdgeBits>(hn::Sub(hn::Set(whole, rank), hn::Iota(whole, 0)));
+    std::array<std::array<std::uint64_t, kLookupLanes>, 4> keys;
+    const auto set = [&](std::size_t corner, auto there, LookupLanes w, auto beside) {
+      const LookupLanes seen = hn::Mul(w, inverse_z);
+      const auto near = hn::IfThenElseZero(hn::And(there, hn::Gt(seen, hn::Zero(kLookupTag))), seen);
+      const auto marked = hn::Or(ranks, hn::IfThenZeroElse(hn::And(crease, hn::RebindMask(whole, beside)), edge));
+      store_pairs(hn::BitCast(whole, near), hn::IfThenElseZero(hn::RebindMask(whole, there), marked),
+                  keys[corner].data());
     };
-    put(there[0], 0), put(there[1], 1);
-    put(there[stride], 2), put(there[stride + 1], 3);
+    set(0, inside, here, hn::Or(left_apart, top_apart));
+    set(1, right, hn::MulAdd(all(scale_), slope_x, here), hn::Or(right_apart, top_apart));
+    set(2, below, hn::MulAdd(all(scale_), slope_y, here), hn::Or(left_apart, below_apart));
+    set(3, hn::And(right, below), hn::MulAdd(all(scale_), hn::Add(slope_x, slope_y), here),
+        hn::Or(right_apart, below_apart));
+
+    alignas(32) std::array<std::int32_t, kLookupLanes> at;
+    const auto line = hn::Sub(hn::ConvertTo(integers, top), hn::Set(integers, begin - 1));
+    hn::Store(
+        hn::Add(hn::Add(hn::Mul(line, hn::Set(integers, stride)), hn::ConvertTo(integers, left)), hn::Set(integers, 1)),
+        integers, at.data());
+    std::array<std::uint8_t, 8> bits;
+    hn::StoreMaskBits(kLookupTag, inside, bits.data());
+    for (unsigned rest = bits[0]; rest != 0; rest &= rest - 1) {
+      const auto lane = static_cast<std::size_t>(std::countr_zero(rest));
+      std::uint64_t* const there = band.data() + at[lane];
+      const auto put = [&](std::uint64_t& place, std::size_t corner) { place = std::max(place, keys[corner][lane]); };
+      put(there[0], 0), put(there[1], 1);
+      put(there[stride], 2), put(there[stride + 1], 3);
+    }
   }
 }
 

@@ -2,7 +2,9 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <array>
+#include <bit>
 #include <cstddef>
 #include <cstdint>
 
@@ -17,6 +19,23 @@ using LookupLanes = hn::Vec<LookupTag>;
 inline constexpr LookupTag kLookupTag;
 inline constexpr std::size_t kLookupLanes = hn::MaxLanes(LookupTag());
 static_assert(kLookupLanes == 4 || kLookupLanes == 8);
+
+/// The next `count` values, and zeros behind them if these are too few.
+template <class T>
+HWY_INLINE hn::Vec<hn::Rebind<T, LookupTag>> load_some(const T* from, std::size_t count) {
+  const hn::Rebind<T, LookupTag> tag;
+  if (count >= kLookupLanes) return hn::LoadU(tag, from);
+  alignas(32) std::array<T, kLookupLanes> some{};
+  std::copy_n(from, count, some.data());
+  return hn::Load(tag, some.data());
+}
+
+/// Stores numbers of 64 bits, given their halves.
+HWY_INLINE void store_pairs(hn::Vec<hn::Rebind<std::uint32_t, LookupTag>> high,
+                            hn::Vec<hn::Rebind<std::uint32_t, LookupTag>> low, std::uint64_t* to) {
+  static_assert(std::endian::native == std::endian::little);
+  hn::StoreInterleaved2(low, high, hn::Rebind<std::uint32_t, LookupTag>(), reinterpret_cast<std::uint32_t*>(to));
+}
 
 /// CubicSpline for points side by side.
 struct LaneSpline {

@@ -1,21 +1,30 @@
 #pragma once
 
-#include <algorithm>
+#include <array>
+#include <cstddef>
 #include <vector>
 
 #include "esim/reproject/depth_splat.h"
 #include "esim/reproject/lens.h"
-#include "esim/reproject/spline_coefficients.h"
+#include "esim/reproject/lookup_lanes.h"
 
+// Private to reproject: includes lookup_lanes.h.
 namespace esim::inline reproject {
 
 /// A keyframe sees a surface if their nearness agrees within this fraction.
 inline constexpr float kSameSurface = 0.02F;
 
-/// Positions of the points of a row of the view in a keyframe, and the values there.
+/// Positions of the points of a row of the view in a keyframe, and the values there. The arrays are filled up with
+/// points in the corner of the keyframe to whole vectors.
 struct RowLookup {
   explicit RowLookup(std::size_t points)
-      : u(points), v(u.size()), nearness(u.size()), value(u.size()), seen(u.size()) {}
+      : count(points),
+        u((points + kLookupLanes - 1) / kLookupLanes * kLookupLanes),
+        v(u.size()),
+        nearness(u.size()),
+        value(u.size()),
+        seen(u.size()) {}
+  std::size_t count;
   std::vector<float> u, v, nearness, value, seen;
 };
 
@@ -44,37 +53,39 @@ inline constexpr float kOutside = 0.01F;
 /// there.
 template <bool depth>
 void look_up_row(const Keyframe::Light& light, RowLookup& row) {
-  const float offset = light.offset;
-  const int stride = light.root.width(), count = static_cast<int>(row.u.size());  // with its border
+  const int stride = light.root.width();  // with its border
   const float right = static_cast<float>(stride - 3), bottom = static_cast<float>(light.root.height() - 3);
-  const float* const c = light.root.data();
-  const float* const near = light.front.data();
-  const float *const u = row.u.data(), *const v = row.v.data(), *const w = row.nearness.data();
-  float *const value = row.value.data(), *const seen = row.seen.data();
-#pragma omp simd
-  for (int x = 0; x < count; ++x) {
-    bool same = true;
-    const float column = u[x] - offset, line = v[x] - offset;
-    const bool inside = u[x] >= -kOutside && u[x] <= right + kOutside && v[x] >= -kOutside && v[x] <= bottom + kOutside;
-    const float clamped_column = std::min(std::max(column, 0.0F), right - 1e-3F);
-    const float clamped_line = std::min(std::max(line, 0.0F), bottom - 1e-3F);
-    const int i = static_cast<int>(clamped_column), j = static_cast<int>(clamped_line);
-    const CubicSpline across(clamped_column - static_cast<float>(i)), down(clamped_line - static_cast<float>(j));
-    const int r0 = j * stride + i, r1 = r0 + stride, r2 = r1 + stride, r3 = r2 + stride;
-    const float root =
-        down(across(c[r0], c[r0 + 1], c[r0 + 2], c[r0 + 3]), across(c[r1], c[r1 + 1], c[r1 + 2], c[r1 + 3]),
-             across(c[r2], c[r2 + 1], c[r2 + 2], c[r2 + 3]), across(c[r3], c[r3 + 1], c[r3 + 2], c[r3 + 3]));
-    value[x] = root * root;
+  const auto all = [](float value) { return hn::Set(kLookupTag, value); };
+  const auto first_pixel = [&](LookupLanes at, float last) {
+    return hn::Min(hn::Max(at, hn::Zero(kLookupTag)), all(last - 1e-3F));
+  };
+  const auto between = [&](LookupLanes x, float low, float high) {
+    return hn::And(hn::Ge(x, all(low)), hn::Le(x, all(high)));
+  };
+  for (std::size_t x = 0; x < row.u.size(); x += kLookupLanes) {
+    const LookupLanes u = hn::LoadU(kLookupTag, &row.u[x]), v = hn::LoadU(kLookupTag, &row.v[x]);
+    auto seen = hn::And(between(u, -kOutside, right + kOutside), between(v, -kOutside, bottom + kOutside));
+
+    const LookupLanes column = first_pixel(hn::Sub(u, all(light.offset)), right),
+                      line = first_pixel(hn::Sub(v, all(light.offset)), bottom);
+    const LanesOfPlaces places(column, line, stride);
+    const LaneSpline across(places.beyond_column), down(places.beyond_line);
+    std::array<LookupLanes, 4> roots;
+    for (int k = 0; k < 4; ++k)
+      roots[static_cast<std::size_t>(k)] = across(fours_at(light.root.data() + k * stride, places.first));
+    const LookupLanes root = down(roots);
+    hn::StoreU(hn::Mul(root, root), kLookupTag, &row.value[x]);
+
     if constexpr (depth) {
-      const int k = static_cast<int>(std::min(std::max(u[x], 0.0F), right - 1e-3F));
-      const int l = static_cast<int>(std::min(std::max(v[x], 0.0F), bottom - 1e-3F));
-      const int n = l * (stride - 2) + k, below = n + stride - 2;
-      const float w0 = near[n], w1 = near[n + 1], w2 = near[below], w3 = near[below + 1];
-      const float low = std::min(std::min(w0, w1), std::min(w2, w3)),
-                  high = std::max(std::max(w0, w1), std::max(w2, w3));
-      same = w[x] >= low * (1 - kSameSurface) && w[x] <= high * (1 + kSameSurface);
+      const LanesOfPlaces pixels(first_pixel(u, right), first_pixel(v, bottom), stride - 2);
+      const auto [w0, w1, w2, w3] = squares_at(light.front.data(), pixels.first, stride - 2);
+      const LookupLanes low = hn::Min(hn::Min(w0, w1), hn::Min(w2, w3)),
+                        high = hn::Max(hn::Max(w0, w1), hn::Max(w2, w3));
+      const LookupLanes w = hn::LoadU(kLookupTag, &row.nearness[x]);
+      seen = hn::And(seen, hn::And(hn::Ge(w, hn::Mul(low, all(1 - kSameSurface))),
+                                   hn::Le(w, hn::Mul(high, all(1 + kSameSurface)))));
     }
-    seen[x] = inside && same ? 1.0F : 0.0F;
+    hn::StoreU(hn::IfThenElseZero(seen, all(1)), kLookupTag, &row.seen[x]);
   }
 }
 

@@ -210,13 +210,11 @@ Image<float> ReprojectedFrames::steps_px(const Keyframe& from, const Keyframe& t
   constexpr float kNowhere = -1e5F;
   const SurfacePoints& points = from.sparse;
   const std::vector<ViewChange> changes = view_changes(from.view, to.view), here = view_changes(from.view, from.view);
-  RowLookup begins(static_cast<std::size_t>(points.size())), ends(begins.u.size());
+  RowLookup begins(static_cast<std::size_t>(points.size())), ends(begins.count);
   std::visit(
       [&](const auto& model) {
         const Projector project(layout().camera, model, kAnywhere);
-        const auto part_at = [&](int i) {
-          return points.part.empty() ? 0U : points.part[static_cast<std::size_t>(i)];
-        };
+        const auto part_at = [&](int i) { return points.part.empty() ? 0U : points.part[static_cast<std::size_t>(i)]; };
         for (int first = 0; first < points.size();) {
           int last = first + 1;
           while (last < points.size() && part_at(last) == part_at(first)) ++last;

@@ -64,7 +64,8 @@ class Between {
         wide_(wide),
         layout_(lay_out_keyframes(sensor_, 2, 12)),
         renderer_(test::make_renderer(name, sensor_, workers)),
-        reprojector_(layout_, renderer_->traits().at_infinity, workers) {}
+        reprojector_(layout_, renderer_->traits().at_infinity, workers,
+                     SceneParts(test::deforming_surfaces_of(name), test::objects_of(name).size())) {}
 
   RenderRequest view(double dt, const Camera& camera) const { return view_of(name_, camera, dt); }
 
@@ -133,9 +134,9 @@ TEST_P(EveryLens, ReprojectionIsDirectRendering) {
 INSTANTIATE_TEST_SUITE_P(Scenes, EveryLens,
                          testing::Combine(testing::Values("panorama", "plane", "mesh"), testing::Values(0, 1, 2, 3)));
 
-TEST(Reprojector, FollowsMovingObjectsAndWhatTheyHide) {
-  for (int distortion : {0, 1}) {
-    Between scene("moving_mesh", distortion);
+TEST(Reprojector, FollowsMovingAndDeformingObjectsAndWhatTheyHide) {
+  for (const auto& [name, distortion] : {std::pair{"moving_mesh", 0}, {"moving_mesh", 1}, {"deforming_mesh", 1}}) {
+    Between scene(name, distortion);
     const Keyframe before = scene.keyframe(0), after = scene.keyframe(0.1);
     const Sample direct = scene.direct(0.05);
     const Reconstruction found = scene.reconstruct(before, after, 0.05, Detail::whole);

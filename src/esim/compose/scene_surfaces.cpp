@@ -3,34 +3,64 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <mutex>
 #include <utility>
 #include <vector>
 
 namespace esim::inline compose {
 namespace {
 
+/// The shapes of an object at the last few times: keyframes are asked for again and again.
+class RecentShapes {
+ public:
+  explicit RecentShapes(std::shared_ptr<const Deformation> deformation) : deformation_(std::move(deformation)) {}
+
+  std::shared_ptr<const DeformedVertices> at(TimeNs t) {
+    {
+      const std::lock_guard lock(mutex_);
+      const auto known = std::find_if(shapes_.begin(), shapes_.end(), [t](const Shape& shape) { return shape.t == t; });
+      if (known != shapes_.end() && known->vertices != nullptr) return known->vertices;
+    }
+    auto vertices = std::make_shared<DeformedVertices>();
+    deformation_->evaluate(t, *vertices);
+    const std::lock_guard lock(mutex_);
+    shapes_[next_++ % shapes_.size()] = {t, vertices};
+    return vertices;
+  }
+
+ private:
+  struct Shape {
+    TimeNs t = 0;
+    std::shared_ptr<const DeformedVertices> vertices;
+  };
+  std::shared_ptr<const Deformation> deformation_;
+  std::mutex mutex_;
+  std::array<Shape, 4> shapes_;
+  std::size_t next_ = 0;
+};
+
 class SceneSurfaces final : public DeformingSurfaces {
  public:
   explicit SceneSurfaces(const Scene& scene) {
     for (const SceneObject& object : scene.objects) {
       if (!object.moves) continue;
-      const bool deforms = object.deformation != nullptr;
-      objects_.push_back({object.deformation, deforms ? object.mesh.triangles : std::vector<Triangle>{}});
+      objects_.emplace_back();
+      if (object.deformation == nullptr) continue;
+      objects_.back() = {std::make_unique<RecentShapes>(object.deformation), object.mesh.triangles};
     }
   }
 
   bool any() const {
-    return std::ranges::any_of(objects_, [](const auto& object) { return object.deformation; });
+    return std::any_of(objects_.begin(), objects_.end(), [](const Object& object) { return object.shapes != nullptr; });
   }
 
   std::size_t triangle_count(std::size_t object) const override { return objects_[object - 1].triangles.size(); }
 
   void locate(std::size_t object, TimeNs t, std::span<const SurfacePoint> points,
               std::span<Eigen::Vector3f> positions) const override {
-    const auto& [deformation, triangles] = objects_[object - 1];
-    DeformedVertices vertices;
-    deformation->evaluate(t, vertices);
-    const std::vector<Eigen::Vector3f>& at = vertices.positions;
+    const auto& [shapes, triangles] = objects_[object - 1];
+    const std::shared_ptr<const DeformedVertices> vertices = shapes->at(t);
+    const std::vector<Eigen::Vector3f>& at = vertices->positions;
     for (std::size_t i = 0; i < points.size(); ++i) {
       const auto& [a, b, c] = triangles[points[i].triangle];
       positions[i] = at[a] + points[i].b1 * (at[b] - at[a]) + points[i].b2 * (at[c] - at[a]);
@@ -38,10 +68,9 @@ class SceneSurfaces final : public DeformingSurfaces {
   }
 
  private:
-  using Triangle = std::array<std::uint32_t, 3>;
   struct Object {
-    std::shared_ptr<const Deformation> deformation;  // null if it is rigid
-    std::vector<Triangle> triangles;
+    std::unique_ptr<RecentShapes> shapes;  // null if it is rigid
+    std::vector<std::array<std::uint32_t, 3>> triangles;
   };
   std::vector<Object> objects_;
 };

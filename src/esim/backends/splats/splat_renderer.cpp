@@ -71,7 +71,11 @@ class SplatRenderer final : public ProcessorRenderer {
   }
 
   RendererTraits traits() const override {
-    return {.name = "splats", .granularity = Granularity::tile, .at_infinity = false, .has_edges = false};
+    return {.name = "splats",
+            .granularity = Granularity::tile,
+            .at_infinity = false,
+            .has_edges = false,
+            .deforms = surfaces_.renderer != nullptr && surfaces_.renderer->traits().deforms};
   }
 
  private:
@@ -85,6 +89,14 @@ class SplatRenderer final : public ProcessorRenderer {
                    Sample& sample) const;
   void write(const Compositor& compositor, int left, int top, const Tile& tile, Sample& sample) const;
   void render_surfaces(std::span<const RenderRequest> requests, Sample& sample) const;
+  void keep_motion_of_surfaces(const Work& work, const BinPart& part, Sample& sample) const;
+
+  /// Whether an object of a sample consists of surfaces.
+  bool is_surface(std::size_t object) const {
+    return object > 0 &&
+           std::find(surfaces_.objects.begin(), surfaces_.objects.end(), object - 1) != surfaces_.objects.end();
+  }
+
   BearingRect bearings_of(int left, int top) const;
 
   const BearingRect& bearings(const BinPart& part) const {
@@ -141,6 +153,7 @@ struct SplatRenderer::Work {
   std::vector<RequestWork> requests;
   std::vector<ProjectedCluster> projected;
   std::vector<ThreadWork> threads;
+  Image<float> motion_x, motion_y;  // V of the surfaces, if they deform
 };
 
 /// The bearings of all places in a bin.
@@ -208,9 +221,11 @@ void SplatRenderer::render_surfaces(std::span<const RenderRequest> requests, Sam
 
 void SplatRenderer::compute(std::span<const RenderRequest> requests, Sample& sample) const {
   if (surfaces_.renderer != nullptr) render_surfaces(requests, sample);
-  prepare(requests, rays_.x.width(), rays_.x.height(), sample);
-
   std::unique_ptr<Work> work = take_work();
+  const bool deforms = traits().deforms;
+  if (deforms) work->motion_x = sample.motion_x, work->motion_y = sample.motion_y;
+  prepare(requests, rays_.x.width(), rays_.x.height(), sample, deforms);
+
   work->requests.resize(requests.size());
   work->threads.resize(static_cast<std::size_t>(workers_.threads()), {Compositor(grey_), {}});
   workers_.for_each(static_cast<int>(requests.size()), [&](int r) {
@@ -244,8 +259,21 @@ void SplatRenderer::compute(std::span<const RenderRequest> requests, Sample& sam
     const auto& [r, k] = parts[static_cast<std::size_t>(i)];
     render_part(requests[r], work->requests[r], work->requests[r].parts[k],
                 work->threads[static_cast<std::size_t>(worker)], sample);
+    if (deforms) keep_motion_of_surfaces(*work, work->requests[r].parts[k], sample);
   });
   give_back(std::move(work));
+}
+
+/// Restores V of the surfaces where they are visible, since they deform.
+void SplatRenderer::keep_motion_of_surfaces(const Work& work, const BinPart& part, Sample& sample) const {
+  for (const Tile& tile : part.tiles) {
+    for (int y = tile.y; y < tile.y + tile.height; ++y) {
+      for (int x = tile.x; x < tile.x + tile.width; ++x) {
+        if (!is_surface(sample.object(x, y))) continue;
+        sample.motion_x(x, y) = work.motion_x(x, y), sample.motion_y(x, y) = work.motion_y(x, y);
+      }
+    }
+  }
 }
 
 void SplatRenderer::render_part(const RenderRequest& request, const RequestWork& work, const BinPart& part,

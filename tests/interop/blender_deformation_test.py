@@ -1,7 +1,9 @@
 """Meshes that deform, as Blender evaluates them: skeletons and shape keys with linear, cubic and step keys, exported by
 Blender's glTF exporter, compared at 101 frames with the vertices of the original scene, and of the import of the GLB.
 
-Run as: blender_deformation_test.py PRINT_VERTICES. Skips (77) without Blender or NumPy.
+Scenes with modifiers are read as .blend files, through esim's own export.
+
+Run as: blender_deformation_test.py PRINT_VERTICES ESIM_PROGRAM. Skips (77) without Blender or NumPy.
 """
 
 import pathlib
@@ -17,7 +19,7 @@ try:
 except ImportError:
     np = None
 
-PRINT_VERTICES = pathlib.Path(sys.argv[1])
+PRINT_VERTICES, ESIM = sys.argv[1:3]
 FPS, FRAMES = 24, 101
 TOLERANCE_M = 1e-5
 # Blender exports the slopes of cubic rotations of bones only roughly, and its importer ignores them: only keys are exact.
@@ -64,6 +66,20 @@ class BlenderDeformation(unittest.TestCase):
                     print(f"{case.stem + kind}: {ours.shape[1]} vertices, largest distance {error:.2e} m")
                     self.assertGreater(np.abs(theirs[0] - theirs[50]).max(), 0.05)
                     self.assertLess(error, TOLERANCE_M)
+
+    def test_scenes_with_modifiers_are_exported_as_they_move(self):
+        times_s = [frame / FPS for frame in range(FRAMES)]
+        for scene in sorted(self.folder.glob("*.blend")):
+            with self.subTest(scene=scene.stem):
+                glb = self.folder / "exported" / f"{scene.stem}.glb"
+                glb.parent.mkdir(exist_ok=True)
+                subprocess.run([ESIM, "import", scene, "--out", glb], check=True, capture_output=True)
+                ours, _ = vertices_of(glb, times_s)
+                theirs = np.load(scene.with_suffix(".npy"))
+                error = np.linalg.norm(ours - theirs[:, matching(ours, theirs)], axis=2).max()
+                print(f"{scene.stem}: {ours.shape[1]} vertices, largest distance {error:.2e} m")
+                self.assertGreater(np.abs(theirs[0] - theirs[50]).max(), 0.05)
+                self.assertLess(error, TOLERANCE_M)
 
     def test_velocities_are_the_derivative_of_positions(self):
         step_s = 1e-3

@@ -3,7 +3,8 @@
     blender -b --python make_deforming.py -- FOLDER
 
 For each CASE: CASE.glb; CASE.npy, vertices in the world at each of the frames FRAMES (frames x vertices x 3); and
-CASE_imported.npy, the same of the GLB after its import.
+CASE_imported.npy, the same of the GLB after its import. For each MODIFIED, scenes with modifiers: MODIFIED.blend and
+MODIFIED.npy.
 """
 
 import math
@@ -130,3 +131,41 @@ for case, make, mode, sampled in (("skinned_linear", skinned, "LINEAR", True), (
     scene = empty_scene()
     bpy.ops.import_scene.gltf(filepath=path + ".glb")
     np.save(path + "_imported.npy", evaluated())
+
+
+def waving():
+    """A modifier that depends on time, on a mesh with shape keys."""
+    morphing("LINEAR")
+    thing = bpy.context.scene.objects["Tube"]
+    wave = thing.modifiers.new("Wave", "WAVE")
+    wave.height, wave.width, wave.speed = 0.2, 0.5, 0.1
+
+
+def subdivided():
+    """A skeleton with a modifier that does not depend on time."""
+    skinned("LINEAR")
+    modifiers = bpy.context.scene.objects["Tube"].modifiers
+    modifiers.new("Subdivision", "SUBSURF").levels = 1
+    bpy.context.view_layer.objects.active = bpy.context.scene.objects["Tube"]
+    bpy.ops.object.modifier_move_up(modifier="Subdivision")
+
+
+def skinned_keys():
+    """Shape keys and a skeleton."""
+    skinned("LINEAR")
+    thing = bpy.context.scene.objects["Tube"]
+    thing.shape_key_add(name="Basis")
+    key = thing.shape_key_add(name="wide")
+    for point in key.data:
+        point.co = (1.5 * point.co.x, 1.2 * point.co.y, point.co.z)
+    for frame, value in ((0, 0.2), (50, 1), (100, 0)):
+        key.value = value
+        key.keyframe_insert("value", frame=frame)
+
+
+for make in (waving, subdivided, skinned_keys):
+    make()
+    path = os.path.join(FOLDER, make.__name__)
+    np.save(path + ".npy", evaluated())
+    bpy.context.scene.frame_set(0)
+    bpy.ops.wm.save_as_mainfile(filepath=path + ".blend")

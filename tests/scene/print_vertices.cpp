@@ -1,4 +1,5 @@
-// Writes the vertices of a scene's objects in the world at given times, for tests that compare them with other programs:
+// Writes the vertices of a scene's objects in the world at given times, for tests that compare them with other
+// programs:
 //
 //   print_vertices SCENE TIME_S ...
 //
@@ -31,9 +32,8 @@ void print(const std::vector<Eigen::Vector3f>& vectors) {
 }
 
 int print_all(const std::string& file, const std::vector<double>& times_s) {
-  const SceneFile scene = load_scene_file(file, [](const std::string& warning) {
-    std::fprintf(stderr, "warning: %s\n", warning.c_str());
-  });
+  const SceneFile scene =
+      load_scene_file(file, [](const std::string& warning) { std::fprintf(stderr, "warning: %s\n", warning.c_str()); });
   for (const SceneMotion& motion : scene.motions) {
     if (motion.size() > 1) return std::fprintf(stderr, "print_vertices: an object moves\n"), 1;
   }

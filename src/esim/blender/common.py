@@ -1,4 +1,4 @@
-# Shared by all scripts; legacy.py precedes it.
+# Shared by all scripts; legacy.py and shapes.py precede it.
 import os
 import struct
 import zlib
@@ -93,7 +93,8 @@ def esim_open(path):
 
 
 def esim_export(path):
+    applies = esim_prepare_shapes()
     bpy.ops.export_scene.gltf(
-        filepath=path, export_format="GLB", export_yup=True, export_apply=True, export_cameras=True,
-        export_extras=True, export_animations=True, export_force_sampling=True, export_morph=False,
-        export_nla_strips=False, export_skins=False)
+        filepath=path, export_format="GLB", export_yup=True, export_apply=applies, export_cameras=True,
+        export_extras=True, export_animations=True, export_force_sampling=True, export_nla_strips=False,
+        export_skins=True, export_all_influences=True, export_morph=True)

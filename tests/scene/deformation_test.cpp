@@ -48,6 +48,8 @@ const SceneObject& object_named(const SceneFile& file, const std::string& name) 
 DeformedVertices vertices_at(const SceneObject& object, double t_s) {
   DeformedVertices vertices;
   object.deformation->evaluate(to_ns(t_s), vertices);
+  const Eigen::AlignedBox3f bounds = object.deformation->bounds(to_ns(t_s));
+  for (const Eigen::Vector3f& vertex : vertices.positions) EXPECT_TRUE(bounds.contains(vertex)) << vertex.transpose();
   return vertices;
 }
 

@@ -30,6 +30,8 @@ class RetimedDeformation final : public Deformation {
     for (Eigen::Vector3f& velocity : vertices.velocities) velocity *= rate;
   }
 
+  Eigen::AlignedBox3f bounds(TimeNs t) const override { return deformation_->bounds(own_time(t)); }
+
  private:
   TimeNs own_time(TimeNs t) const {
     const double passed = static_cast<double>(std::max<TimeNs>(0, t - clock_.start)) / clock_.time_scale;
@@ -59,6 +61,11 @@ class ScaledDeformation final : public Deformation {
     deformation_->evaluate(t, vertices);
     for (Eigen::Vector3f& position : vertices.positions) position *= factor_;
     for (Eigen::Vector3f& velocity : vertices.velocities) velocity *= factor_;
+  }
+
+  Eigen::AlignedBox3f bounds(TimeNs t) const override {
+    const Eigen::AlignedBox3f box = deformation_->bounds(t);
+    return {factor_ * box.min(), factor_ * box.max()};
   }
 
  private:

@@ -81,7 +81,32 @@ SkinnedDeformation::SkinnedDeformation(RestShape rest, SkinWeights weights, std:
       weights_(std::move(weights)),
       morphs_(std::move(morphs)),
       joints_(std::move(joints)),
-      span_(span) {}
+      span_(span),
+      moved_by_(joints_.size()) {
+  for (std::size_t vertex = 0; vertex < rest_.vertices.size(); ++vertex) {
+    for (std::size_t i = weights_.begin_of(vertex); i < weights_.ends[vertex]; ++i)
+      moved_by_[weights_.influences[i].joint].extend(rest_.vertices[vertex]);
+  }
+}
+
+Eigen::AlignedBox3f SkinnedDeformation::bounds(TimeNs t) const {
+  if (!morphs_.empty()) return Deformation::bounds(t);
+  thread_local std::vector<JointMatrix> matrices;
+  joints_.evaluate(to_seconds(t), matrices);
+  Eigen::AlignedBox3f box;
+  for (std::size_t joint = 0; joint < moved_by_.size(); ++joint) {
+    if (moved_by_[joint].isEmpty()) continue;
+    const float* const columns = matrices[joint].columns;
+    const Eigen::Map<const Eigen::Matrix<float, 4, 3>> linear(columns);
+    const Eigen::Vector3f middle =
+        (times(columns, moved_by_[joint].center()) + Eigen::Map<const Eigen::Vector4f>(columns + 12)).head<3>();
+    const Eigen::Vector3f reach = 0.5F * (linear.topRows<3>().cwiseAbs() * moved_by_[joint].sizes());
+    box.extend(middle - reach), box.extend(middle + reach);
+  }
+  constexpr float kRounding = 1e-5F;  // of single precision
+  const Eigen::Vector3f margin = kRounding * (box.min().cwiseAbs() + box.max().cwiseAbs());
+  return {box.min() - margin, box.max() + margin};
+}
 
 void SkinnedDeformation::evaluate(TimeNs t, DeformedVertices& vertices) const {
   // Memory that a thread keeps, since new pages cost more than the arithmetic.

@@ -40,12 +40,16 @@ class SkinnedDeformation final : public Deformation {
   TimeSpan span() const override { return span_; }
   void evaluate(TimeNs t, DeformedVertices& vertices) const override;
 
+  /// Without morph targets, from the boxes of what each joint moves: a vertex lies between where its joints put it.
+  Eigen::AlignedBox3f bounds(TimeNs t) const override;
+
  private:
   RestShape rest_;
   SkinWeights weights_;
   std::vector<Morph> morphs_;
   JointMotion joints_;
   TimeSpan span_;
+  std::vector<Eigen::AlignedBox3f> moved_by_;  // per joint, the rest vertices that it influences
 };
 
 }  // namespace esim::inline scene

@@ -6,10 +6,11 @@
 namespace esim::inline backends::inline raycast {
 namespace {
 
-constexpr std::size_t kKept = 4;          // objects that no request uses
-constexpr int kProbes = 16;               // times at which trees are compared
-constexpr double kMuchSlower = 1.5;       // cost of a tree in proportion to that of a new one
-constexpr std::size_t kNoBranches = ~0U;  // of an object without a tree
+constexpr std::size_t kKept = 4;            // objects that no request uses
+constexpr int kProbes = 16;                 // times at which trees are compared
+constexpr TimeNs kProbed = 60'000'000'000;  // the time from the beginning in which they are: animations may repeat
+constexpr double kMuchSlower = 1.5;         // cost of a tree in proportion to that of a new one
+constexpr std::size_t kNoBranches = ~0U;    // of an object without a tree
 
 }  // namespace
 
@@ -25,7 +26,8 @@ DeformingGroup::DeformingGroup(const SceneObject& object, const TriangleUse& use
 
 /// Builds a tree for the beginning, and another one wherever the previous tree has become much slower than a new one.
 void DeformingGroup::plant_trees() {
-  const TimeSpan span = deformation_->span();
+  TimeSpan span = deformation_->span();
+  span.end = std::min(span.end, span.start + kProbed);
   DeformedVertices vertices;
   TriangleTree refitted;
   for (int probe = 0; probe <= kProbes; ++probe) {

@@ -2,26 +2,13 @@
 
 #include "esim/blender/blender.h"
 #include "esim/compose/compose.h"
+#include "esim/compose/load_lighting.h"
 #include "esim/core/error.h"
 #include "esim/geometry/upright.h"
 #include "esim/scene/splats/splat_file.h"
 
 namespace esim::inline compose {
 namespace {
-
-Lighting lighting_of(const LambertOptions& options) {
-  Lighting lighting;
-  lighting.ambient = static_cast<float>(options.ambient);
-  for (const SunOptions& sun : options.suns) {
-    if (!(sun.direction.norm() > 1e-6))
-      throw UserError("renderer.lighting.suns: direction must not be [0, 0, 0]; [0, 0, -1] shines straight down");
-    lighting.suns.push_back({sun.direction.cast<float>(), static_cast<float>(sun.strength)});
-  }
-  for (const PointLightOptions& point : options.points)
-    lighting.points.push_back({point.position.cast<float>(), static_cast<float>(point.strength)});
-  lighting.shadows = options.shadows;
-  return lighting;
-}
 
 void require_scene_path(const std::filesystem::path& path, const std::string& key) {
   if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
@@ -70,23 +57,23 @@ Splats upright_splats(const SplatsRendererOptions& options, const Notices& notic
 
 /// Loads an object: a mesh, or splats for a renderer with these.
 SceneObject load_object(const ObjectOptions& options, const SplatsRendererOptions* with_splats, SceneLook look,
-                        const Notices& notices) {
+                        SurfaceModel model, const Notices& notices) {
   SceneObject object{options.name, {}, true};
   if (with_splats != nullptr && is_splat_file(options.scene)) {
     object.splats = std::make_shared<const Splats>(splats_of(options.scene, options.scale, *with_splats, notices));
     return object;
   }
-  object.mesh = load_mesh(readable(options.scene, notices), notices.warning, look);
+  object.mesh = load_mesh(readable(options.scene, notices), notices.warning, look, model);
   for (Eigen::Vector3f& vertex : object.mesh.vertices) vertex *= static_cast<float>(options.scale);
   return object;
 }
 
-/// Adds the objects that a scenario lists.
+/// Adds the objects that a scenario lists, and the light.
 void add_objects(const std::vector<ObjectOptions>& objects, const LightingOptions& lighting,
                  const SplatsRendererOptions* with_splats, SceneLook look, const Notices& notices, SceneFile& file) {
   for (std::size_t i = 0; i < objects.size(); ++i) {
     require_scene_path(objects[i].scene, fmt::format("objects.{}.scene", i));
-    SceneObject loaded = load_object(objects[i], with_splats, look, notices);
+    SceneObject loaded = load_object(objects[i], with_splats, look, surface_model(lighting, look), notices);
     if (loaded.name.empty()) loaded.name = fmt::format("object{}", i);
     for (const SceneObject& other : file.scene.objects) {
       if (!other.moves || other.name != loaded.name) continue;
@@ -95,12 +82,12 @@ void add_objects(const std::vector<ObjectOptions>& objects, const LightingOption
     }
     file.scene.objects.push_back(std::move(loaded));
   }
-  if (const auto* lambert = std::get_if<LambertOptions>(&lighting)) file.scene.lighting = lighting_of(*lambert);
+  file.scene.lighting = load_lighting(lighting, file.scene, look);
 }
 
 SceneFile load(const MeshRendererOptions& options, SceneLook look, const Notices& notices) {
   require_scene_path(options.scene, "scene");
-  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning, look);
+  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting, look));
   notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   add_objects(options.objects, options.lighting, nullptr, look, notices, file);
   return file;
@@ -112,10 +99,14 @@ SceneFile load(const SplatsRendererOptions& options, SceneLook look, const Notic
   if (is_splat_file(options.scene)) {
     file.scene.objects.push_back({"", {}, false, std::make_shared<const Splats>(upright_splats(options, notices))});
   } else {
-    file = load_scene_file(readable(options.scene, notices), notices.warning, look);
+    file = load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting, look));
     notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   }
   add_objects(options.objects, options.lighting, &options, look, notices, file);
+  if (file.scene.lighting && file.scene.lighting->environment_visible) {
+    throw UserError(
+        "renderer.lighting.environment.visible: must be false with splats, which have their own surroundings");
+  }
   return file;
 }
 

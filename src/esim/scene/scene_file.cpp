@@ -31,12 +31,13 @@ std::string counted(std::size_t count, const char* singular, const char* plural)
 
 }  // namespace
 
-SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look) {
-  return flatten(read_graph(path), path, warn, look);
+SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look,
+                          SurfaceModel model) {
+  return flatten(read_graph(path), path, warn, look, model);
 }
 
-Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look) {
-  return flatten_still(read_graph(path), path, warn, look);
+Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look, SurfaceModel model) {
+  return flatten_still(read_graph(path), path, warn, look, model);
 }
 
 std::string summary(const SceneFile& file) {

@@ -12,6 +12,11 @@ namespace esim::inline backends::inline raycast {
 inline Lighting in_camera_frame(Lighting lighting, const PlacedGroup& world) {
   for (SunLight& sun : lighting.suns) sun.direction = world.R_camera_group * sun.direction.normalized();
   for (PointLight& point : lighting.points) point.position = world.R_camera_group * (point.position - world.camera);
+  for (AreaLight& area : lighting.areas) {
+    area.position = world.R_camera_group * (area.position - world.camera);
+    for (Eigen::Vector3f* const vector : {&area.half_u, &area.half_v, &area.direction})
+      *vector = world.R_camera_group * *vector;
+  }
   return lighting;
 }
 
@@ -74,13 +79,69 @@ struct SurfacePoints {
   }
 };
 
+inline constexpr float kNearestLamp = 1e-3F;  // m
+inline constexpr float kToLamp = 0.9999F;     // fraction of the distance: the lamp itself casts no shadow
+
+/// Finds which points of surfaces see a light.
+template <int K>
+class ShadowRays {
+ public:
+  explicit ShadowRays(const std::vector<PlacedGroup>& groups) : groups_(groups) {}
+
+  /// Those of `lanes` whose points see the light: no triangle crosses the vector to it, up to `reach` times its length.
+  std::uint32_t visible(const SurfacePoints<K>& surface, const VectorLanes<K>& to_light, float reach,
+                        std::uint32_t lanes) const {
+    // Slightly above the surface, by more than the rounding error of the point.
+    VectorLanes<K> start;
+    const float to_origin = groups_[0].camera.template lpNorm<1>();
+    for (unsigned i = 0; i < K; ++i) {
+      const float x = surface.point.x[i], y = surface.point.y[i], z = surface.point.z[i];
+      const float gap = 2e-5F * (std::fabs(x) + std::fabs(y) + std::fabs(z) + to_origin);
+      start.x[i] = x + gap * surface.triangle_normal.x[i];
+      start.y[i] = y + gap * surface.triangle_normal.y[i];
+      start.z[i] = z + gap * surface.triangle_normal.z[i];
+    }
+    for (const PlacedGroup& group : groups_) {
+      if (lanes != 0 && group.triangles != nullptr) lanes &= ~occluded(group, start, to_light, reach, lanes);
+    }
+    return lanes;
+  }
+
+ private:
+  /// Those of `lanes` whose rays meet a triangle of the group.
+  static std::uint32_t occluded(const PlacedGroup& group, const VectorLanes<K>& start, const VectorLanes<K>& to_light,
+                                float reach, std::uint32_t lanes) {
+    const Eigen::Matrix3f& R = group.R_group_camera;
+    embree::Rays<K> ray;
+    alignas(64) std::array<int, K> wanted;
+    for (unsigned i = 0; i < K; ++i) {
+      wanted[i] = (lanes >> i & 1U) != 0 ? -1 : 0;
+      Eigen::Vector3f origin = Eigen::Vector3f::Zero(), direction = Eigen::Vector3f::UnitZ();
+      if (wanted[i] != 0) {  // other lanes may contain NaN
+        origin = group.camera + R * Eigen::Vector3f(start.x[i], start.y[i], start.z[i]);
+        direction = R * Eigen::Vector3f(to_light.x[i], to_light.y[i], to_light.z[i]);
+      }
+      ray.org_x[i] = origin.x(), ray.org_y[i] = origin.y(), ray.org_z[i] = origin.z();
+      ray.dir_x[i] = direction.x(), ray.dir_y[i] = direction.y(), ray.dir_z[i] = direction.z();
+      ray.tnear[i] = 0, ray.tfar[i] = reach, ray.time[i] = 0;
+      ray.mask[i] = ~0U, ray.id[i] = 0, ray.flags[i] = 0;
+    }
+    embree::occlude<K>(wanted.data(), group.triangles, ray);
+    std::uint32_t found = 0;
+    for (unsigned i = 0; i < K; ++i) found |= (ray.tfar[i] < 0 ? 1U : 0U) << i;  // Embree's mark of a hit
+    return found;
+  }
+
+  const std::vector<PlacedGroup>& groups_;
+};
+
 /// The light on surfaces: the bracket of the formula in Lighting.
 template <int K>
 class LightOnSurfaces {
  public:
   /// `lighting` is in the camera frame.
   LightOnSurfaces(const Lighting& lighting, const std::vector<PlacedGroup>& groups)
-      : lighting_(lighting), groups_(groups) {}
+      : lighting_(lighting), shadow_rays_(groups) {}
 
   std::array<float, K> at(const SurfacePoints<K>& surface, std::uint32_t hits) const {
     std::array<float, K> light;
@@ -107,9 +168,6 @@ class LightOnSurfaces {
   }
 
  private:
-  static constexpr float kNearestLamp = 1e-3F;  // m
-  static constexpr float kToLamp = 0.9999F;     // fraction of the distance: the lamp itself casts no shadow
-
   static float cosine(const VectorLanes<K>& n, const VectorLanes<K>& l, unsigned i) {
     return n.x[i] * l.x[i] + n.y[i] * l.y[i] + n.z[i] * l.z[i];
   }
@@ -120,56 +178,13 @@ class LightOnSurfaces {
       for (unsigned i = 0; i < K; ++i) {
         if (!(received[i] > 0)) hits &= ~(1U << i);
       }
-      hits = visible(surface, to_light, reach, hits);
+      hits = shadow_rays_.visible(surface, to_light, reach, hits);
     }
     for (unsigned i = 0; i < K; ++i) light[i] += (hits >> i & 1U) != 0 ? received[i] : 0.0F;
   }
 
-  /// Those of `lanes` whose points see the light: no triangle crosses the vector to it, up to `reach` times its length.
-  std::uint32_t visible(const SurfacePoints<K>& surface, const VectorLanes<K>& to_light, float reach,
-                        std::uint32_t lanes) const {
-    // Slightly above the surface, by more than the rounding error of the point.
-    VectorLanes<K> start;
-    const float to_origin = groups_[0].camera.template lpNorm<1>();
-    for (unsigned i = 0; i < K; ++i) {
-      const float x = surface.point.x[i], y = surface.point.y[i], z = surface.point.z[i];
-      const float gap = 2e-5F * (std::fabs(x) + std::fabs(y) + std::fabs(z) + to_origin);
-      start.x[i] = x + gap * surface.triangle_normal.x[i];
-      start.y[i] = y + gap * surface.triangle_normal.y[i];
-      start.z[i] = z + gap * surface.triangle_normal.z[i];
-    }
-    for (const PlacedGroup& group : groups_) {
-      if (lanes != 0 && group.triangles != nullptr) lanes &= ~occluded(group, start, to_light, reach, lanes);
-    }
-    return lanes;
-  }
-
-  /// Those of `lanes` whose rays meet a triangle of the group.
-  static std::uint32_t occluded(const PlacedGroup& group, const VectorLanes<K>& start, const VectorLanes<K>& to_light,
-                                float reach, std::uint32_t lanes) {
-    const Eigen::Matrix3f& R = group.R_group_camera;
-    embree::Rays<K> ray;
-    alignas(64) std::array<int, K> wanted;
-    for (unsigned i = 0; i < K; ++i) {
-      wanted[i] = (lanes >> i & 1U) != 0 ? -1 : 0;
-      Eigen::Vector3f origin = Eigen::Vector3f::Zero(), direction = Eigen::Vector3f::UnitZ();
-      if (wanted[i] != 0) {  // other lanes may contain NaN
-        origin = group.camera + R * Eigen::Vector3f(start.x[i], start.y[i], start.z[i]);
-        direction = R * Eigen::Vector3f(to_light.x[i], to_light.y[i], to_light.z[i]);
-      }
-      ray.org_x[i] = origin.x(), ray.org_y[i] = origin.y(), ray.org_z[i] = origin.z();
-      ray.dir_x[i] = direction.x(), ray.dir_y[i] = direction.y(), ray.dir_z[i] = direction.z();
-      ray.tnear[i] = 0, ray.tfar[i] = reach, ray.time[i] = 0;
-      ray.mask[i] = ~0U, ray.id[i] = 0, ray.flags[i] = 0;
-    }
-    embree::occlude<K>(wanted.data(), group.triangles, ray);
-    std::uint32_t found = 0;
-    for (unsigned i = 0; i < K; ++i) found |= (ray.tfar[i] < 0 ? 1U : 0U) << i;  // Embree's mark of a hit
-    return found;
-  }
-
   const Lighting& lighting_;
-  const std::vector<PlacedGroup>& groups_;
+  ShadowRays<K> shadow_rays_;
 };
 
 }  // namespace esim::inline backends::inline raycast

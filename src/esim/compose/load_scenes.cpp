@@ -87,7 +87,8 @@ void add_objects(const std::vector<ObjectOptions>& objects, const LightingOption
 
 SceneFile load(const MeshRendererOptions& options, SceneLook look, const Notices& notices) {
   require_scene_path(options.scene, "scene");
-  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting, look));
+  SceneFile file =
+      load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting, look));
   notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   add_objects(options.objects, options.lighting, nullptr, look, notices, file);
   return file;
@@ -99,7 +100,8 @@ SceneFile load(const SplatsRendererOptions& options, SceneLook look, const Notic
   if (is_splat_file(options.scene)) {
     file.scene.objects.push_back({"", {}, false, std::make_shared<const Splats>(upright_splats(options, notices))});
   } else {
-    file = load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting, look));
+    file =
+        load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting, look));
     notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   }
   add_objects(options.objects, options.lighting, &options, look, notices, file);

@@ -45,10 +45,10 @@ struct PointLight {
 /// a distance of r metres, much larger than the rectangle, gets the radiance strength / r². It is evaluated at
 /// `samples` x `samples` fixed points, each at the centre of an equal part of the rectangle.
 struct AreaLight {
-  Eigen::Vector3f position = Eigen::Vector3f::Zero();     ///< of its centre; world frame, or frame of `object`, m
+  Eigen::Vector3f position = Eigen::Vector3f::Zero();        ///< of its centre; world frame, or frame of `object`, m
   Eigen::Vector3f half_u = 0.5F * Eigen::Vector3f::UnitX();  ///< from the centre to the middle of a side; m
   Eigen::Vector3f half_v = 0.5F * Eigen::Vector3f::UnitY();  ///< to the next side, perpendicular to half_u; m
-  Eigen::Vector3f direction = -Eigen::Vector3f::UnitZ();  ///< in which it shines; unit length
+  Eigen::Vector3f direction = -Eigen::Vector3f::UnitZ();     ///< in which it shines; unit length
   float strength = 1;
   int samples = 4;
   StrengthCurve curve{};

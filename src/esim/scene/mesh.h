@@ -44,10 +44,10 @@ Planes decoded(const CodedTexture& texture, bool colour);
 /// How a surface shines: the parameters of the metallic-roughness model of glTF 2.0 besides the base colour. The
 /// textures are linear and multiplied by the factors.
 struct Gloss {
-  float metallic = 0;           ///< 0: dielectric, 1: metal
-  float roughness = 1;          ///< perceptual, 0 to 1: the square root of the lobe's alpha
-  float reflectance = 0.04F;    ///< of a dielectric at normal incidence (index of refraction 1.5)
-  float edge_reflectance = 1;   ///< of a dielectric at grazing incidence
+  float metallic = 0;          ///< 0: dielectric, 1: metal
+  float roughness = 1;         ///< perceptual, 0 to 1: the square root of the lobe's alpha
+  float reflectance = 0.04F;   ///< of a dielectric at normal incidence (index of refraction 1.5)
+  float edge_reflectance = 1;  ///< of a dielectric at grazing incidence
   std::shared_ptr<const Texture> metallic_texture{}, roughness_texture{};
 
   /// Components of normals, stored as (n + 1) / 2: x towards larger u, y towards smaller v, z outwards. Their mean over

@@ -12,8 +12,8 @@
 // Private to backends/opengl: includes epoxy/gl.h.
 namespace esim::inline backends::inline opengl {
 
-/// What glossy surfaces need besides suns and lamps: rectangles that shine, the environment, and the sky. Belongs to the
-/// current context.
+/// What glossy surfaces need besides suns and lamps: rectangles that shine, the environment, and the sky. Belongs to
+/// the current context.
 class GlGloss {
  public:
   /// Throws UserError if the lights cast shadows that shadow maps do not support.

@@ -37,8 +37,8 @@ void GlScene::add(const SceneObject& object, std::vector<Vertex>& vertices) {
     if (i == 0 || material_index != mesh.material[order[i - 1]]) {
       const Material& material = mesh.materials[material_index];
       added.parts.push_back({static_cast<GLint>(vertices.size()), 0, texture(material.texture.get()),
-                             texture(material.emission_texture.get()), material.base, material.emission,
-                             material.unlit, material.gloss, gloss_textures(material.gloss.get())});
+                             texture(material.emission_texture.get()), material.base, material.emission, material.unlit,
+                             material.gloss, gloss_textures(material.gloss.get())});
     }
     for (std::size_t corner = 0; corner < 3; ++corner) {
       const std::uint32_t vertex = mesh.triangles[triangle][corner];

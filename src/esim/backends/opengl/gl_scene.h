@@ -24,7 +24,7 @@ class GlScene {
     GLuint base_texture, emission_texture;  // 0: none
     float base, emission;
     bool unlit;
-    std::shared_ptr<const Gloss> gloss;                      // null: Gloss()
+    std::shared_ptr<const Gloss> gloss;    // null: Gloss()
     std::array<GLuint, 5> gloss_textures;  // metallic, roughness, and the three of normals; 0: none
   };
   struct Object {

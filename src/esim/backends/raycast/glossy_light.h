@@ -17,7 +17,6 @@ struct Reflected {
   alignas(64) std::array<float, K> of_base, other;
 };
 
-
 /// Light on glossy surfaces, by the model of glTF 2.0 (Khronos, "Specification", B.2 and B.3): a dielectric layer over
 /// a diffuse surface, mixed with a metal. With the Fresnel term of Schlick, s = (1 - <v, h>)^5, and R = strength times
 /// <n, l> pi D V,
@@ -158,8 +157,7 @@ class LightOnGlossySurfaces {
       const Eigen::Vector3f v(surface.view.x[i], surface.view.y[i], surface.view.z[i]);
       const Eigen::Vector3f normal = R * n, mirrored = R * (2 * n.dot(v) * n - v);
       const float diffuse = environment.diffuse(views[i], normal.x(), normal.y(), normal.z());
-      const float lobe =
-          environment.specular(views[i], mirrored.x(), mirrored.y(), mirrored.z(), surface.roughness[i]);
+      const float lobe = environment.specular(views[i], mirrored.x(), mirrored.y(), mirrored.z(), surface.roughness[i]);
       add_surroundings(surface, i, diffuse, lobe, sum);
     }
   }

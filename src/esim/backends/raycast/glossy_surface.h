@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "esim/backends/raycast/lights.h"
-#include "esim/backends/raycast/texture_frame.h"
+#include "esim/scene/texture_frame.h"
 
 // Private to backends/raycast.
 /// Surfaces that shine, which a packet of rays has hit. All vectors are in the camera frame.
@@ -48,8 +48,8 @@ struct GlossLanes {
 /// What of a surface decides how it reflects.
 template <int K>
 struct GlossySurface {
-  SurfacePoints<K> at;  // with the normals that light sees
-  VectorLanes<K> view;  // unit vectors to the camera
+  SurfacePoints<K> at;                           // with the normals that light sees
+  VectorLanes<K> view;                           // unit vectors to the camera
   alignas(64) std::array<float, K> cosine_view;  // between the normal and these, at least kGrazing
   alignas(64) std::array<float, K> roughness;
   alignas(64) std::array<float, K> alpha2;  // square of the lobe's alpha
@@ -79,8 +79,8 @@ struct GlossySurface {
 
  private:
   /// Replaces the normals by those of normal maps. A mean normal of length m means that normals in the footprint vary,
-  /// with a variance of their slopes of (1 - m) / m (Toksvig, "Mipmapping normal maps", 2004); alpha² of a lobe is twice
-  /// the variance of its slopes, so that this widens it by `widening`.
+  /// with a variance of their slopes of (1 - m) / m (Toksvig, "Mipmapping normal maps", 2004); alpha² of a lobe is
+  /// twice the variance of its slopes, so that this widens it by `widening`.
   void bend_normals(const RaycastScene& scene, const Packet<K>& packet, const std::array<std::uint32_t, K>& triangles,
                     const GroupRotations<K>& rotations, std::array<float, K>& widening) {
     const auto& R = rotations.element;
@@ -96,8 +96,7 @@ struct GlossySurface {
       const float length = std::min(m.norm(), 1.0F);
       Eigen::Vector3f n(at.normal.x[i], at.normal.y[i], at.normal.z[i]), t, b;
       const Eigen::Vector3f g(at.triangle_normal.x[i], at.triangle_normal.y[i], at.triangle_normal.z[i]);
-      if (!(length > 1e-3F) ||
-          !texture_frame(rotated(triangle.gradient_u), rotated(triangle.gradient_v), g, n, t, b))
+      if (!(length > 1e-3F) || !texture_frame(rotated(triangle.gradient_u), rotated(triangle.gradient_v), g, n, t, b))
         continue;
       // Seen from behind, the relief is the other way around.
       const float across[3] = {packet.ray.hit.Ng_x[i], packet.ray.hit.Ng_y[i], packet.ray.hit.Ng_z[i]};

@@ -18,8 +18,7 @@ struct Moment {
   std::optional<Lighting> lighting;  // in the camera frame
   std::optional<Sky> sky;            // instead of the background
 
-  Moment(const RaycastScene& scene, const RenderRequest& request)
-      : groups(scene.place(request)) {
+  Moment(const RaycastScene& scene, const RenderRequest& request) : groups(scene.place(request)) {
     if (!scene.lighting()) return;
     std::vector<SE3> objects;
     for (const Kinematics& object : request.objects) objects.push_back(object.T_world_body);
@@ -119,8 +118,8 @@ class Shading {
                        Rays<K>& rays) const {
     GlossySurface<K> surface;
     surface.take(scene_, rays.packet, rays.triangle, rays.material, rays.at, rotations, lit);
-    const Reflected<K> reflected = LightOnGlossySurfaces<K>(*moment.lighting, moment.groups)
-                                       .at(surface, views_of<K>(rays.first_material), lit);
+    const Reflected<K> reflected =
+        LightOnGlossySurfaces<K>(*moment.lighting, moment.groups).at(surface, views_of<K>(rays.first_material), lit);
     for (unsigned i = 0; i < K; ++i) {
       rays.light[i] = (lit >> i & 1U) != 0 ? reflected.of_base[i] : rays.light[i];
       rays.shine[i] = (lit >> i & 1U) != 0 ? reflected.other[i] : rays.shine[i];

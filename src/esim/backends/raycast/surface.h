@@ -119,7 +119,7 @@ void locate_on_textures(const Packet<K>& packet, const RayBlock& block, int firs
 /// Mean of factor times a texture over each footprint.
 template <int K>
 void fill_mean(const Texture* texture, float factor, const TextureLookup<K>& at, std::uint32_t lanes,
-                 std::array<float, K>& out) {
+               std::array<float, K>& out) {
   if (texture == nullptr || factor == 0) {
 #pragma omp simd
     for (unsigned i = 0; i < K; ++i) out[i] = (lanes >> i & 1U) != 0 ? factor : out[i];

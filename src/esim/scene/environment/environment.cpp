@@ -6,6 +6,7 @@
 #include <numbers>
 
 #include "esim/core/error.h"
+#include "esim/core/parallel.h"
 #include "esim/scene/images/image_file.h"
 
 namespace esim::inline scene {
@@ -13,8 +14,10 @@ namespace {
 
 constexpr int kSmallest = 64, kLargest = 1024;
 
-/// Sizes of the maps for roughness 1/8, ... 1: a lobe covers at least several texels.
-constexpr std::array<int, Environment::kLevels - 1> kSizes = {256, 128, 64, 32, 32, 32, 32, 32};
+/// Sizes of the maps for roughness 1/8, ... 1, of which a lobe covers at least several texels; and numbers of
+/// directions in a lobe.
+constexpr std::array<int, Environment::kLevels - 1> kSizes = {256, 128, 128, 64, 64, 64, 64, 64};
+constexpr std::array<unsigned, Environment::kLevels - 1> kDirections = {256, 512, 512, 1024, 1024, 1024, 1024, 1024};
 
 /// Maps of half the size each, so that a mean over any solid angle is a single look-up.
 class Pyramid {
@@ -57,7 +60,7 @@ class Pyramid {
     while (layouts_[i].size > size) ++i;
     return layouts_[i];
   }
-  float* values() { return values_.data(); }
+  const float* values() const { return values_.data(); }
   int size() const { return layouts_[0].size; }
 
  private:
@@ -83,13 +86,12 @@ struct LobeSample {
 
 /// Directions of the GGX lobe that is seen along its axis, from half vectors at the points of a Hammersley set; each
 /// stands for a solid angle (Křivánek, Colbert, "Real-time shading with filtered importance sampling", EGSR 2008).
-std::vector<LobeSample> lobe(float roughness, int pyramid_size) {
-  constexpr unsigned kCount = 256;
-  constexpr float kPi = std::numbers::pi_v<float>, kOverlap = 2;
+std::vector<LobeSample> lobe(float roughness, unsigned count, int pyramid_size) {
+  constexpr float kPi = std::numbers::pi_v<float>;
   const float alpha = roughness * roughness, alpha2 = alpha * alpha;
   const float texel = 4 * kPi / static_cast<float>(pyramid_size * pyramid_size);
   std::vector<LobeSample> samples;
-  for (unsigned i = 0; i < kCount; ++i) {
+  for (unsigned i = 0; i < count; ++i) {
     std::uint32_t bits = i;  // its bits in reverse order
     bits = (bits << 16) | (bits >> 16);
     bits = ((bits & 0x55555555U) << 1) | ((bits & 0xAAAAAAAAU) >> 1);
@@ -97,25 +99,25 @@ std::vector<LobeSample> lobe(float roughness, int pyramid_size) {
     bits = ((bits & 0x0F0F0F0FU) << 4) | ((bits & 0xF0F0F0F0U) >> 4);
     bits = ((bits & 0x00FF00FFU) << 8) | ((bits & 0xFF00FF00U) >> 8);
     const float azimuth = 2 * kPi * (static_cast<float>(bits >> 8) + 0.5F) / 16777216.0F;
-    const float quantile = (static_cast<float>(i) + 0.5F) / kCount;
+    const float quantile = (static_cast<float>(i) + 0.5F) / static_cast<float>(count);
     const float n_h2 = (1 - quantile) / (1 + (alpha2 - 1) * quantile), n_h = std::sqrt(n_h2);
     const float across = std::sqrt(std::max(1 - n_h2, 0.0F));
     const Eigen::Vector3f half(across * std::cos(azimuth), across * std::sin(azimuth), n_h);
     const Eigen::Vector3f direction = 2 * n_h * half - Eigen::Vector3f::UnitZ();
     if (!(direction.z() > 0)) continue;
     const float spread = n_h2 * (alpha2 - 1) + 1, density = alpha2 / (kPi * spread * spread) / 4;
-    const float level = 0.5F * std::log2(kOverlap / (kCount * density * texel));
+    const float level = -0.5F * std::log2(static_cast<float>(count) * density * texel);
     samples.push_back({direction, direction.z(), level});
   }
   return samples;
 }
 
 template <class Function>
-void fill(const OctahedralLayout& map, float* values, const Function& value) {
-  for (int row = 0; row < map.size; ++row) {
+void fill(const OctahedralLayout& map, const Workers& workers, float* values, const Function& value) {
+  workers.for_each(map.size, [&](int row) {
     for (int column = 0; column < map.size; ++column)
       map.texel(values, column, row) = value(map.centre(column, row).direction());
-  }
+  });
   map.fold(values);
 }
 
@@ -131,7 +133,7 @@ float filtered(const Pyramid& pyramid, const std::vector<LobeSample>& lobe, cons
 }
 
 /// The mean weighted by the cosine, by all texels of a small map.
-float diffuse_mean(Pyramid& pyramid, const Eigen::Vector3f& normal) {
+float diffuse_mean(const Pyramid& pyramid, const Eigen::Vector3f& normal) {
   const OctahedralLayout& map = pyramid.at_most(kSmallest);
   float sum = 0, weights = 0;
   for (int row = 0; row < map.size; ++row) {
@@ -166,9 +168,10 @@ Environment::Environment(const Planes& planes, float strength, double rotation_r
     for (float& value : view.pixels()) {
       value *= strength;
       if (!(value >= 0) || !std::isfinite(value))
-        throw UserError(fmt::format("{}: its light must be finite and not negative, but it has a pixel of {}; repair "
-                                    "the image",
-                                    name, value));
+        throw UserError(
+            fmt::format("{}: its light must be finite and not negative, but it has a pixel of {}; repair "
+                        "the image",
+                        name, value));
     }
     skies_[view_count_++] = std::make_shared<const Texture>(view, Wrap::repeat, Wrap::clamp);
     const std::vector<float> values = prefiltered(view);
@@ -180,10 +183,13 @@ std::vector<float> Environment::prefiltered(const Image<float>& image) const {
   std::vector<float> values(view_size_);
   turn(image, values.data());
   Pyramid pyramid(levels_[0], values.data());
-  fill(kDiffuse, values.data(), [&](const Eigen::Vector3f& normal) { return diffuse_mean(pyramid, normal); });
+  const Workers workers(0);
+  fill(kDiffuse, workers, values.data(), [&](const Eigen::Vector3f& normal) { return diffuse_mean(pyramid, normal); });
   for (std::size_t i = 1; i < levels_.size(); ++i) {
-    const std::vector<LobeSample> samples = lobe(static_cast<float>(i) / (kLevels - 1), pyramid.size());
-    fill(levels_[i], values.data(), [&](const Eigen::Vector3f& axis) { return filtered(pyramid, samples, axis); });
+    const std::vector<LobeSample> samples =
+        lobe(static_cast<float>(i) / (kLevels - 1), kDirections[i - 1], pyramid.size());
+    fill(levels_[i], workers, values.data(),
+         [&](const Eigen::Vector3f& axis) { return filtered(pyramid, samples, axis); });
   }
   return values;
 }

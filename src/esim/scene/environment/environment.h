@@ -29,8 +29,8 @@ class Environment {
   /// Of 0 for luminance, 1 + colour otherwise. Without colours, all are the luminance.
   std::size_t view_offset(std::size_t view) const { return view < view_count_ ? view * view_size_ : 0; }
 
-  /// Mean radiance that a diffuse surface with this normal receives, weighted by the cosine. Directions are in the world
-  /// frame, of any length except zero.
+  /// Mean radiance that a diffuse surface with this normal receives, weighted by the cosine. Directions are in the
+  /// world frame, of any length except zero.
   float diffuse(std::size_t view, float x, float y, float z) const {
     return kDiffuse.value(values_.data() + view_offset(view), OctahedralPlace::of(x, y, z));
   }
@@ -55,7 +55,7 @@ class Environment {
   std::span<const float> values() const { return {values_.data(), view_size_}; }  ///< of all maps, in luminance
 
  private:
-  static constexpr OctahedralLayout kDiffuse{32, 0};
+  static constexpr OctahedralLayout kDiffuse{64, 0};
 
   std::vector<float> prefiltered(const Image<float>& image) const;
   void turn(const Image<float>& image, float* values) const;

@@ -38,8 +38,8 @@ struct OctahedralPlace {
 };
 
 /// Where a map of size x size texels lies among values that several maps share. Texels are in rows, with one more
-/// around the square that repeats the texel behind the fold, so that the bilinear interpolation between texel centres is
-/// continuous everywhere on the sphere.
+/// around the square that repeats the texel behind the fold, so that the bilinear interpolation between texel centres
+/// is continuous everywhere on the sphere.
 struct OctahedralLayout {
   int size = 0;
   std::size_t offset = 0;
@@ -61,7 +61,8 @@ struct OctahedralLayout {
     return above + t * (below - above);
   }
 
-  float& texel(float* values, int column, int row) const {
+  template <typename Value>
+  Value& texel(Value* values, int column, int row) const {
     return values[offset + static_cast<std::size_t>(row + 1) * row_length() + static_cast<std::size_t>(column + 1)];
   }
   OctahedralPlace centre(int column, int row) const {

@@ -7,15 +7,15 @@
 namespace esim::inline scene {
 namespace {
 
-/// The integral over the directions of light, by half vectors that are distributed like those of the lobe: at the
-/// quantiles (i + 1/2) / n of their elevation, and at equal steps of their azimuth.
+/// The integral over the directions of light, by half vectors at quantiles of the lobe's elevation, closer together
+/// towards the horizon, and at equal steps of the azimuth.
 SplitSum::Value integral(double cosine, double roughness) {
-  constexpr int kElevations = 128, kAzimuths = 64;
+  constexpr int kElevations = 64, kAzimuths = 64;
   const double alpha = std::max(roughness * roughness, 1e-4), alpha2 = alpha * alpha;
   const double sine = std::sqrt(std::max(1 - cosine * cosine, 0.0));
   double scale = 0, offset = 0;
   for (int i = 0; i < kElevations; ++i) {
-    const double quantile = (i + 0.5) / kElevations;
+    const double left = 1 - (i + 0.5) / kElevations, quantile = 1 - left * left;
     const double n_h = std::sqrt((1 - quantile) / (1 + (alpha2 - 1) * quantile));
     const double across = std::sqrt(std::max(1 - n_h * n_h, 0.0));
     for (int j = 0; j < kAzimuths; ++j) {
@@ -25,7 +25,7 @@ SplitSum::Value integral(double cosine, double roughness) {
       if (!(n_l > 0) || !(v_h > 0)) continue;
       const double visibility = 0.5 / (n_l * std::sqrt(alpha2 + (1 - alpha2) * cosine * cosine) +
                                        cosine * std::sqrt(alpha2 + (1 - alpha2) * n_l * n_l));
-      const double weight = 4 * visibility * n_l * v_h / n_h, schlick = std::pow(1 - v_h, 5);
+      const double weight = 2 * left * 4 * visibility * n_l * v_h / n_h, schlick = std::pow(1 - v_h, 5);
       scale += weight * (1 - schlick), offset += weight * schlick;
     }
   }

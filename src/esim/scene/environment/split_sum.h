@@ -5,9 +5,9 @@
 
 namespace esim::inline scene {
 
-/// How much of uniform light a glossy surface reflects, by the cosine of the viewing angle and the roughness: with F0 at
-/// normal and F90 at grazing incidence, F0 scale + F90 offset (Karis, "Real shading in Unreal Engine 4", SIGGRAPH 2013
-/// course, with the height-correlated visibility of glTF 2.0). Within 2e-3 of the integral.
+/// How much of uniform light a glossy surface reflects, by the cosine of the viewing angle and the roughness: with F0
+/// at normal and F90 at grazing incidence, F0 scale + F90 offset (Karis, "Real shading in Unreal Engine 4", SIGGRAPH
+/// 2013 course, with the height-correlated visibility of glTF 2.0). Within 2e-3 of the integral.
 class SplitSum {
  public:
   struct Value {

@@ -43,12 +43,9 @@ TextureLookup<K> on_equirectangular(const Eigen::Matrix3f& R_image_camera, const
     const float u_x = -kPerLongitude * dy / rho2, u_y = kPerLongitude * dx / rho2;
     const float scale = kPerLatitude / (rho2 + dz * dz);
     const float v_x = -dz * dx / rho * scale, v_y = -dz * dy / rho * scale, v_z = rho * scale;
-    const float right_x = r00 * rays.dx_du[i] + r01 * rays.dy_du[i],
-                down_x = r00 * rays.dx_dv[i] + r01 * rays.dy_dv[i];
-    const float right_y = r10 * rays.dx_du[i] + r11 * rays.dy_du[i],
-                down_y = r10 * rays.dx_dv[i] + r11 * rays.dy_dv[i];
-    const float right_z = r20 * rays.dx_du[i] + r21 * rays.dy_du[i],
-                down_z = r20 * rays.dx_dv[i] + r21 * rays.dy_dv[i];
+    const float right_x = r00 * rays.dx_du[i] + r01 * rays.dy_du[i], down_x = r00 * rays.dx_dv[i] + r01 * rays.dy_dv[i];
+    const float right_y = r10 * rays.dx_du[i] + r11 * rays.dy_du[i], down_y = r10 * rays.dx_dv[i] + r11 * rays.dy_dv[i];
+    const float right_z = r20 * rays.dx_du[i] + r21 * rays.dy_du[i], down_z = r20 * rays.dx_dv[i] + r21 * rays.dy_dv[i];
     at.du_dx[i] = u_x * right_x + u_y * right_y;
     at.dv_dx[i] = v_x * right_x + v_y * right_y + v_z * right_z;
     at.du_dy[i] = u_x * down_x + u_y * down_y;

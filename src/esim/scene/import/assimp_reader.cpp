@@ -142,7 +142,8 @@ class Converter {
       if (!material.base.allFinite() || !material.emission.allFinite())
         fail_scene(file_, fmt::format("a colour of material {} is not finite", material.name));
       if (!std::isfinite(material.roughness) || !std::isfinite(material.metallic))
-        fail_scene(file_, fmt::format("the roughness or the metallic factor of material {} is not finite", material.name));
+        fail_scene(file_,
+                   fmt::format("the roughness or the metallic factor of material {} is not finite", material.name));
       graph_.materials.push_back(std::move(material));
     }
     if (graph_.materials.empty()) graph_.materials.push_back({.name = "none"});

@@ -61,8 +61,8 @@ std::shared_ptr<const Gloss> GlossTextures::convert(const GraphMaterial& source)
   gloss.roughness = clamped("roughness", source.roughness, name, store_.warning());
   gloss.reflectance = clamped("reflectance", source.reflectance, name, store_.warning());
   gloss.edge_reflectance = clamped("specular factor", source.edge_reflectance, name, store_.warning());
-  gloss.roughness_texture = channel(source.roughness_texture, kGreen, name,
-                                    fmt::format("its roughness is {} everywhere", gloss.roughness));
+  gloss.roughness_texture =
+      channel(source.roughness_texture, kGreen, name, fmt::format("its roughness is {} everywhere", gloss.roughness));
   gloss.metallic_texture = channel(source.metallic_texture, kBlue, name,
                                    fmt::format("its metallic factor is {} everywhere", gloss.metallic));
   gloss.normal_textures = normals(source.normal_texture, source.normal_scale, name);

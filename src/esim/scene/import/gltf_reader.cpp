@@ -142,9 +142,8 @@ class GltfReader {
       material.edge_reflectance = strength;
       if (GltfDocument::find(*specular, "specularTexture") != nullptr ||
           GltfDocument::find(*specular, "specularColorTexture") != nullptr)
-        graph_.gloss_warnings.push_back(
-            fmt::format("material {}: its texture of KHR_materials_specular is not supported, and is ignored",
-                        material.name));
+        graph_.gloss_warnings.push_back(fmt::format(
+            "material {}: its texture of KHR_materials_specular is not supported, and is ignored", material.name));
     }
   }
 

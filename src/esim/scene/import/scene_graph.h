@@ -90,7 +90,7 @@ struct SceneGraph {
   int bump_maps = 0;           ///< of which this number has only heights, which are not supported
   std::vector<std::string> warnings;
   std::vector<std::string> gloss_warnings;  ///< of what matters only if surfaces shine
-  std::vector<std::string> files;  ///< that another process opened to read the scene
+  std::vector<std::string> files;           ///< that another process opened to read the scene
 };
 
 /// Limits of a scene, so that a small file cannot request gigabytes.

@@ -3,8 +3,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
-// Private to backends/raycast.
-namespace esim::inline backends::inline raycast {
+namespace esim::inline scene {
 
 /// The frame of a texture on a surface with the unit normal n: t towards larger u, b towards smaller v, both
 /// perpendicular to n. From the gradients gu and gv of the texture coordinates in the triangle's plane, whose normal is
@@ -23,4 +22,4 @@ inline bool texture_frame(const Eigen::Vector3f& gu, const Eigen::Vector3f& gv, 
   return true;
 }
 
-}  // namespace esim::inline backends::inline raycast
+}  // namespace esim::inline scene

@@ -21,6 +21,7 @@
 #include "esim/motion/trajectory.h"
 #include "esim/render/deforming_surfaces.h"
 #include "esim/render/point_spread.h"
+#include "esim/scene/environment/environment.h"
 
 namespace esim::test {
 
@@ -177,6 +178,50 @@ inline Scene deforming_scene() {
   return scene;
 }
 
+/// A smooth equirectangular image without a seam.
+inline Image<float> smooth_sky(int height) {
+  Image<float> image(2 * height, height);
+  for (int y = 0; y < height; ++y) {
+    for (int x = 0; x < 2 * height; ++x) {
+      const double longitude = std::numbers::pi * (1 - (x + 0.5) / height);
+      const double latitude = std::numbers::pi * (0.5 - (y + 0.5) / height), c = std::cos(latitude);
+      image(x, y) = static_cast<float>(0.6 + 0.3 * c * std::cos(longitude) - 0.2 * c * std::sin(longitude) +
+                                       0.25 * std::sin(latitude) + 0.3 * c * c * std::cos(2 * longitude));
+    }
+  }
+  return image;
+}
+
+/// The walls shine, with smooth textures of every parameter, and the objects are metals of two roughnesses, under every
+/// kind of light; one object carries a lamp.
+inline Scene glossy_moving_scene() {
+  Scene scene = moving_scene();
+  Gloss wall;
+  wall.roughness_texture = wall.metallic_texture = smooth_texture(Wrap::repeat, Wrap::repeat);
+  Image<float> across = smooth_image(256, 256), upright = across;
+  for (float& n : across.pixels()) n = 0.5F + 0.2F * (n - 0.5F);
+  for (float& n : upright.pixels()) n = 0.99F;
+  const auto texture = [](const Image<float>& image) {
+    return std::make_shared<const Texture>(image, Wrap::repeat, Wrap::repeat);
+  };
+  wall.normal_textures = {texture(across), texture(across), texture(upright)};
+  scene.objects[0].mesh.materials[0].gloss = std::make_shared<const Gloss>(wall);
+  scene.objects[1].mesh.materials[0].gloss = std::make_shared<const Gloss>(Gloss{1, 0.35F});
+  scene.objects[2].mesh.materials[0].gloss = std::make_shared<const Gloss>(Gloss{0, 0.5F});
+  Lighting& lighting = scene.lighting.emplace();
+  lighting.glossy = true;
+  lighting.ambient = 0.05F;
+  lighting.suns.push_back({{0.5F, 0.3F, -1}, 0.4F});
+  lighting.points.push_back({{0.3F, -0.5F, 0.9F}, 2, {{{0, 0.5F}, {1, 2}}}});
+  lighting.points.push_back({{0, 0, 1.2F}, 1, {}, 1});
+  AreaLight area;
+  area.position = {0.5F, 0, 1.9F}, area.strength = 2;
+  lighting.areas.push_back(area);
+  static const auto sky = std::make_shared<const Environment>(Planes{smooth_sky(64)}, 0.5F, 0.3, "sky");
+  lighting.environment = sky;
+  return scene;
+}
+
 /// The surfaces of a mesh with smooth_texture(), covered with flat splats on a lattice, at most `spacing` apart.
 inline Splats splats_of(const Mesh& mesh, float spacing) {
   Splats splats;
@@ -256,7 +301,10 @@ inline constexpr std::array kRenderersOfSpace = {"panorama",
                                                  "moving_splats_gl",
                                                  "blurred_panorama",
                                                  "moving_blurred_raster",
-                                                 "deforming_blurred_raster"};
+                                                 "deforming_blurred_raster",
+                                                 "moving_glossy_mesh",
+                                                 "moving_glossy_raster",
+                                                 "moving_glossy_gl"};
 inline constexpr std::array kRenderersOnSensor = {"sprites", "blurred_sprites"};
 
 /// Every renderer on a scene that fills the view from near the origin. Those of `gl` and `sprites` ignore `area`.
@@ -279,9 +327,10 @@ inline std::unique_ptr<Renderer> make_renderer(const std::string& name, const Ca
     return make_splat_renderer(name == "splats" ? still : moving, {}, camera, workers, kNone, area.texture);
   }
   if (name.ends_with("splats_gl")) return make_gl_splat_renderer(splat_objects(true), {}, camera, {}, area.texture);
-  const Scene scene = name.starts_with("deforming") ? deforming_scene()
-                      : name.starts_with("moving")  ? moving_scene()
-                                                    : still_scene(box_mesh());
+  const Scene scene = name.starts_with("deforming")       ? deforming_scene()
+                      : name.starts_with("moving_glossy") ? glossy_moving_scene()
+                      : name.starts_with("moving")        ? moving_scene()
+                                                          : still_scene(box_mesh());
   if (name.ends_with("gl")) return make_gl_renderer(scene, {}, camera);
   if (name.ends_with("raster"))
     return make_raster_renderer(build_raster_scene(scene), {}, camera, workers, kNone, area);

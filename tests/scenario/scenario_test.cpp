@@ -217,7 +217,7 @@ renderer:
   EXPECT_DOUBLE_EQ(std::get<MeshRendererOptions>(scaled.renderer).objects[1].scale, 3);
   EXPECT_TRUE(contains(error(yaml, {"renderer.objects.0.scale=0"}), "renderer.objects.0.scale"));
   EXPECT_TRUE(contains(error(yaml, {"renderer.objects=3"}), "must be a list"));
-  EXPECT_TRUE(contains(error(yaml, {"renderer.lighting.type=phong"}), "is not one of unlit, lambert"));
+  EXPECT_TRUE(contains(error(yaml, {"renderer.lighting.type=phong"}), "is not one of unlit, lambert, pbr"));
 }
 
 TEST_F(ScenarioFile, ReadsTheWaypointsOfObjectsInEveryRenderer) {

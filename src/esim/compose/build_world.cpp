@@ -6,6 +6,7 @@
 
 #include "esim/compose/camera_renderers.h"
 #include "esim/compose/compose.h"
+#include "esim/compose/load_lighting.h"
 #include "esim/compose/scene_surfaces.h"
 #include "esim/core/engine_error.h"
 #include "esim/formats/formats.h"
@@ -274,6 +275,7 @@ World build(const Scenario& scenario, const SceneFile& scene, std::shared_ptr<co
   check_output(scenario);
   name_formats_without_labels(scenario, notices);
   warn_of_light_without_effect(scenario, notices);
+  name_unsampled_light(scenario, scene.scene, notices);
   for (const CameraOptions& options : scenario.cameras) {
     check_sampling(options, notices);
     check_filters(options, notices);

@@ -5,6 +5,7 @@
 
 #include "esim/blender/blender.h"
 #include "esim/compose/compose.h"
+#include "esim/compose/load_lighting.h"
 #include "esim/core/error.h"
 #include "esim/geometry/upright.h"
 #include "esim/scene/deformation/adapted.h"
@@ -12,20 +13,6 @@
 
 namespace esim::inline compose {
 namespace {
-
-Lighting lighting_of(const LambertOptions& options) {
-  Lighting lighting;
-  lighting.ambient = static_cast<float>(options.ambient);
-  for (const SunOptions& sun : options.suns) {
-    if (!(sun.direction.norm() > 1e-6))
-      throw UserError("renderer.lighting.suns: direction must not be [0, 0, 0]; [0, 0, -1] shines straight down");
-    lighting.suns.push_back({sun.direction.cast<float>(), static_cast<float>(sun.strength)});
-  }
-  for (const PointLightOptions& point : options.points)
-    lighting.points.push_back({point.position.cast<float>(), static_cast<float>(point.strength)});
-  lighting.shadows = options.shadows;
-  return lighting;
-}
 
 void require_scene_path(const std::filesystem::path& path, const std::string& key) {
   if (path.empty()) throw UserError(fmt::format("renderer.{}: is missing; name a file", key));
@@ -75,8 +62,8 @@ Splats upright_splats(const SplatsRendererOptions& options, const Notices& notic
 /// Loads the objects that a scenario lists. Those of the same file and scale share its textures and deformation.
 class ObjectLoader {
  public:
-  ObjectLoader(const SplatsRendererOptions* with_splats, SceneLook look, const Notices& notices)
-      : with_splats_(with_splats), look_(look), notices_(notices) {}
+  ObjectLoader(const SplatsRendererOptions* with_splats, SceneLook look, SurfaceModel model, const Notices& notices)
+      : with_splats_(with_splats), look_(look), model_(model), notices_(notices) {}
 
   /// An object: a mesh, or splats for a renderer with these.
   SceneObject load(const ObjectOptions& options) {
@@ -94,7 +81,7 @@ class ObjectLoader {
       object.splats = std::make_shared<const Splats>(splats_of(options.scene, options.scale, *with_splats_, notices_));
       return object;
     }
-    object = load_scene_object(readable(options.scene, notices_), notices_.warning, look_);
+    object = load_scene_object(readable(options.scene, notices_), notices_.warning, look_, model_);
     object.moves = true;
     for (Eigen::Vector3f& vertex : object.mesh.vertices) vertex *= static_cast<float>(options.scale);
     if (object.deformation == nullptr) return object;
@@ -107,14 +94,15 @@ class ObjectLoader {
 
   const SplatsRendererOptions* with_splats_;
   SceneLook look_;
+  SurfaceModel model_;
   const Notices& notices_;
   std::map<std::pair<std::filesystem::path, double>, SceneObject> loaded_;
 };
 
-/// Adds the objects that a scenario lists.
+/// Adds the objects that a scenario lists, and the light.
 void add_objects(const std::vector<ObjectOptions>& objects, const LightingOptions& lighting,
                  const SplatsRendererOptions* with_splats, SceneLook look, const Notices& notices, SceneFile& file) {
-  ObjectLoader loader(with_splats, look, notices);
+  ObjectLoader loader(with_splats, look, surface_model(lighting, look), notices);
   for (std::size_t i = 0; i < objects.size(); ++i) {
     require_scene_path(objects[i].scene, fmt::format("objects.{}.scene", i));
     SceneObject loaded = loader.load(objects[i]);
@@ -126,12 +114,13 @@ void add_objects(const std::vector<ObjectOptions>& objects, const LightingOption
     }
     file.scene.objects.push_back(std::move(loaded));
   }
-  if (const auto* lambert = std::get_if<LambertOptions>(&lighting)) file.scene.lighting = lighting_of(*lambert);
+  file.scene.lighting = load_lighting(lighting, file.scene, look);
 }
 
 SceneFile load(const MeshRendererOptions& options, SceneLook look, const Notices& notices) {
   require_scene_path(options.scene, "scene");
-  SceneFile file = load_scene_file(readable(options.scene, notices), notices.warning, look);
+  SceneFile file =
+      load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting, look));
   notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   add_objects(options.objects, options.lighting, nullptr, look, notices, file);
   return file;
@@ -143,10 +132,15 @@ SceneFile load(const SplatsRendererOptions& options, SceneLook look, const Notic
   if (is_splat_file(options.scene)) {
     file.scene.objects.push_back({"", {}, false, std::make_shared<const Splats>(upright_splats(options, notices))});
   } else {
-    file = load_scene_file(readable(options.scene, notices), notices.warning, look);
+    file =
+        load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting, look));
     notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   }
   add_objects(options.objects, options.lighting, &options, look, notices, file);
+  if (file.scene.lighting && file.scene.lighting->environment_visible) {
+    throw UserError(
+        "renderer.lighting.environment.visible: must be false with splats, which have their own surroundings");
+  }
   return file;
 }
 

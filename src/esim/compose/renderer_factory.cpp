@@ -69,6 +69,15 @@ void require_same_light(const std::vector<SplatObject>& objects) {
   }
 }
 
+/// Renumbers the objects that carry lights: by their place among the objects with these numbers.
+void count_carriers_among(const std::vector<std::size_t>& numbers, Lighting& lighting) {
+  const auto renumber = [&](std::optional<std::size_t>& object) {
+    if (object) object = static_cast<std::size_t>(std::ranges::find(numbers, *object) - numbers.begin());
+  };
+  for (PointLight& light : lighting.points) renumber(light.object);
+  for (AreaLight& light : lighting.areas) renumber(light.object);
+}
+
 /// The engine on the processor that suits the scene. Rays are faster if there are many triangles in each pixel, or if
 /// one ray per pixel is enough (bench_renderers).
 MeshEngine choose_for_processor(const MeshRendererOptions& options, const Scene& scene) {
@@ -120,6 +129,7 @@ RendererFactory factory(const SplatsRendererOptions& options, const SceneFile& f
     }
   }
   require_same_light(objects);
+  if (meshes.scene.lighting) count_carriers_among(moving_meshes, *meshes.scene.lighting);
   const bool only_splats = meshes.scene.objects.empty();
   if (options.engine == SplatsEngine::gl && !only_splats)
     throw UserError("renderer.engine: gl cannot render meshes among splats; use processor");

@@ -22,6 +22,12 @@ enum class SceneLook {
   coded,      ///< factors in each colour; textures stay encoded as in their files (see CodedTexture)
 };
 
+/// What is loaded of a scene's materials.
+enum class SurfaceModel {
+  matte,   ///< base colour and emission
+  glossy,  ///< also how they shine (see Gloss)
+};
+
 /// An encoded image.
 struct CodedTexture {
   std::string name;                ///< for messages
@@ -35,6 +41,20 @@ struct CodedTexture {
 /// decoded, or if it is larger than 8192 x 8192.
 Planes decoded(const CodedTexture& texture, bool colour);
 
+/// How a surface shines: the parameters of the metallic-roughness model of glTF 2.0 besides the base colour. The
+/// textures are linear and multiplied by the factors.
+struct Gloss {
+  float metallic = 0;          ///< 0: dielectric, 1: metal
+  float roughness = 1;         ///< perceptual, 0 to 1: the square root of the lobe's alpha
+  float reflectance = 0.04F;   ///< of a dielectric at normal incidence (index of refraction 1.5)
+  float edge_reflectance = 1;  ///< of a dielectric at grazing incidence
+  std::shared_ptr<const Texture> metallic_texture{}, roughness_texture{};
+
+  /// Components of normals, stored as (n + 1) / 2: x towards larger u, y towards smaller v, z outwards. Their mean over
+  /// a pixel is shorter than 1 if they differ. All three or none.
+  std::array<std::shared_ptr<const Texture>, 3> normal_textures{};
+};
+
 /// The appearance of a surface: its base colour, which is radiance if it is unlit and albedo if it is lit (see
 /// Lighting), and its emission. Each is a factor times a texture, or the factor alone if the texture is null.
 struct Material {
@@ -45,6 +65,7 @@ struct Material {
   float emission = 0;                                             ///< radiance, added to that of the base colour
   bool unlit = false;                                             ///< shows its base colour in any light
   std::shared_ptr<const CodedTexture> coded{}, coded_emission{};  ///< for SceneLook::coded, instead of the textures
+  std::shared_ptr<const Gloss> gloss{};  ///< for SurfaceModel::glossy; the same in luminance and in each colour
 };
 
 /// Textured triangles, in metres.
@@ -63,6 +84,7 @@ using WarningHandler = std::function<void(const std::string&)>;
 
 /// Loads a scene file (see load_scene_file) as one static mesh, as at the start of its animation. Throws UserError,
 /// naming the file, if it cannot be read, is damaged, or has no triangles.
-Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look = SceneLook::luminance);
+Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look = SceneLook::luminance,
+               SurfaceModel model = SurfaceModel::matte);
 
 }  // namespace esim::inline scene

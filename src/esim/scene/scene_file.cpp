@@ -31,16 +31,18 @@ std::string counted(std::size_t count, const char* singular, const char* plural)
 
 }  // namespace
 
-SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look) {
-  return flatten(read_graph(path), path, warn, look);
+SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look,
+                          SurfaceModel model) {
+  return flatten(read_graph(path), path, warn, look, model);
 }
 
-Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look) {
-  return flatten_joined(read_graph(path), path, warn, look, false).mesh;
+Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look, SurfaceModel model) {
+  return flatten_joined(read_graph(path), path, warn, look, model, false).mesh;
 }
 
-SceneObject load_scene_object(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look) {
-  return flatten_joined(read_graph(path), path, warn, look, true);
+SceneObject load_scene_object(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look,
+                              SurfaceModel model) {
+  return flatten_joined(read_graph(path), path, warn, look, model, true);
 }
 
 std::string summary(const SceneFile& file) {

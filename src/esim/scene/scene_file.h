@@ -40,11 +40,12 @@ struct SceneFile {
 /// scene's own folder and below. If one is missing, elsewhere or unreadable, there is a warning, and its surfaces are
 /// grey. Throws UserError, naming the file, if it cannot be read, is damaged, or has no triangles.
 SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn,
-                          SceneLook look = SceneLook::luminance);
+                          SceneLook look = SceneLook::luminance, SurfaceModel model = SurfaceModel::matte);
 
 /// Loads a scene file as one object in the file's coordinates, with the name of the file. If anything in it is
 /// animated, the object deforms: all animations are played. Throws as load_scene_file().
-SceneObject load_scene_object(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look);
+SceneObject load_scene_object(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look,
+                              SurfaceModel model = SurfaceModel::matte);
 
 /// A summary in one line: objects, triangles, materials, textures, cameras, animation.
 std::string summary(const SceneFile& file);

@@ -44,7 +44,7 @@ export interface Made {
 export async function loadMesh(url: string, lighting: Json | undefined): Promise<Made> {
   const gltf = await new GLTFLoader().loadAsync(url);
   const made: Made = { group: new Group(), details: [], small: [] };
-  const lit = getIn(lighting, "type") === "lambert";
+  const lit = ["lambert", "pbr"].includes(String(getIn(lighting, "type")));
   const meshes: Mesh[] = [];
   gltf.scene.traverse((object) => {
     if (object instanceof Mesh) meshes.push(object);

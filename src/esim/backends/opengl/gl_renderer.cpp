@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "esim/backends/opengl/gl_context.h"
+#include "esim/backends/opengl/gl_gloss.h"
 #include "esim/backends/opengl/gl_program.h"
 #include "esim/backends/opengl/gl_read_back.h"
 #include "esim/backends/opengl/gl_scene.h"
@@ -66,6 +67,7 @@ class GlRenderer final : public Renderer {
     samples_ = offered_samples(options.samples_per_pixel);
     scene_.emplace(scene);
     if (lighting_ && lighting_->shadows) shadows_.emplace(scene, *scene_);
+    if (lighting_ && lighting_->glossy) gloss_.emplace(*lighting_, *scene_);
     make_passes();
     if (view_.looked_up) upload_lens(rays);
     glCreateVertexArrays(1, &no_vertices_);
@@ -135,8 +137,9 @@ class GlRenderer final : public Renderer {
 
   void make_passes() {
     const GLenum floats = view_.looked_up ? GL_RGBA32F : GL_RG32F;  // a lens needs the slope of 1 / Z
-    ShaderSource surfaces = {kSurfaceFragmentShader}, resolve = {kResolveFragmentShader};
+    ShaderSource surfaces = {kMeanShader, kSurfaceFragmentShader}, resolve = {kResolveFragmentShader};
     if (shadows_) surfaces.insert(surfaces.begin(), kShadowShader);
+    if (gloss_) surfaces.insert(surfaces.begin(), kGlossyDefinition), surfaces.push_back(kGlossyShader);
     surface_program_ = make_program({kSurfaceVertexShader}, surfaces);
     surfaces_ = GlTarget::make(view_.width, view_.height, samples_, true, floats);
     if (resolves()) {
@@ -182,7 +185,7 @@ class GlRenderer final : public Renderer {
 
     T_camera_world_ = request.camera.T_world_body.inverse();
     upload_twists(request);
-    upload_lights();
+    upload_lights(request);
   }
 
   void upload_twists(const RenderRequest& request) const {
@@ -192,15 +195,19 @@ class GlRenderer final : public Renderer {
     upload(twists, twists_, kTwistsBinding);
   }
 
-  void upload_lights() {
+  void upload_lights(const RenderRequest& request) {
     std::vector<ShaderLight> lights;
     if (lighting_) {
+      std::vector<SE3> objects;
+      for (const Kinematics& object : request.objects) objects.push_back(object.T_world_body);
+      const Lighting now = lighting_at(*lighting_, request.t, objects);
+      if (gloss_) gloss_->upload(now, T_camera_world_);
       const Eigen::Matrix3d R = T_camera_world_.rotation.toRotationMatrix();
-      for (const SunLight& sun : lighting_->suns) {
+      for (const SunLight& sun : now.suns) {
         const Eigen::Vector3f to = -(R * sun.direction.cast<double>().normalized()).cast<float>();
         lights.push_back({{to.x(), to.y(), to.z(), 0}, {sun.strength, 0, 0, 0}});
       }
-      for (const PointLight& light : lighting_->points) {
+      for (const PointLight& light : now.points) {
         const Eigen::Vector3f at = (T_camera_world_ * light.position.cast<double>()).cast<float>();
         lights.push_back({{at.x(), at.y(), at.z(), 1}, {light.strength, 0, 0, 0}});
       }
@@ -243,6 +250,7 @@ class GlRenderer final : public Renderer {
   /// Draws the scene once; a stencil prevents shading of pixels outside the request's tiles.
   void draw_surfaces(const RenderRequest& request) const {
     clear_surfaces(request.tiles);
+    if (gloss_) gloss_->draw_sky(view_, no_vertices_);
     const GLuint program = surface_program_;
     glUseProgram(program);
     glEnable(GL_DEPTH_TEST);
@@ -252,6 +260,7 @@ class GlRenderer final : public Renderer {
     set(program, "ambient", lighting_ ? lighting_->ambient : 0.0F);
     set(program, "light_count", light_count_);
     if (shadows_) shadows_->bind_to(program);
+    if (gloss_) gloss_->bind_to(program);
     std::size_t moving = 0;
     for (const GlScene::Object& object : scene_->objects()) {
       const SE3 pose = object.moves ? T_camera_world_ * request.objects[moving].T_world_body : T_camera_world_;
@@ -295,6 +304,7 @@ class GlRenderer final : public Renderer {
     set(program, "base", part.base);
     set(program, "emission", part.emission);
     set(program, "lit", static_cast<int>(lighting_.has_value() && !part.unlit));
+    if (gloss_) gloss_->bind_part(program, part);
     glDrawArrays(GL_TRIANGLES, part.first, part.count);
   }
 
@@ -318,6 +328,7 @@ class GlRenderer final : public Renderer {
   int samples_ = 1;
   std::optional<GlScene> scene_;
   std::optional<GlShadows> shadows_;
+  std::optional<GlGloss> gloss_;
   GlTarget surfaces_, resolved_, distorted_;
   GLuint surface_program_ = 0, resolve_program_ = 0, distort_program_ = 0;
   GLuint centres_ = 0, footprints_ = 0, bearings_ = 0, jacobians_ = 0;

@@ -37,8 +37,8 @@ void GlScene::add(const SceneObject& object, std::vector<Vertex>& vertices) {
     if (i == 0 || material_index != mesh.material[order[i - 1]]) {
       const Material& material = mesh.materials[material_index];
       added.parts.push_back({static_cast<GLint>(vertices.size()), 0, texture(material.texture.get()),
-                             texture(material.emission_texture.get()), material.base, material.emission,
-                             material.unlit});
+                             texture(material.emission_texture.get()), material.base, material.emission, material.unlit,
+                             material.gloss, gloss_textures(material.gloss.get())});
     }
     for (std::size_t corner = 0; corner < 3; ++corner) {
       const std::uint32_t vertex = mesh.triangles[triangle][corner];
@@ -65,6 +65,13 @@ void GlScene::upload(const std::vector<Vertex>& vertices) {
   attribute(kPosition, 3, offsetof(Vertex, position));
   attribute(kNormal, 3, offsetof(Vertex, normal));
   attribute(kTextureUv, 2, offsetof(Vertex, texture_uv));
+}
+
+std::array<GLuint, 5> GlScene::gloss_textures(const Gloss* gloss) {
+  if (gloss == nullptr) return {};
+  return {texture(gloss->metallic_texture.get()), texture(gloss->roughness_texture.get()),
+          texture(gloss->normal_textures[0].get()), texture(gloss->normal_textures[1].get()),
+          texture(gloss->normal_textures[2].get())};
 }
 
 /// With a mip pyramid, for the mean over a pixel's footprint.

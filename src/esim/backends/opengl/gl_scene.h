@@ -2,7 +2,9 @@
 
 #include <epoxy/gl.h>
 
+#include <array>
 #include <map>
+#include <memory>
 #include <vector>
 
 #include "esim/scene/scene.h"
@@ -22,6 +24,8 @@ class GlScene {
     GLuint base_texture, emission_texture;  // 0: none
     float base, emission;
     bool unlit;
+    std::shared_ptr<const Gloss> gloss;    // null: Gloss()
+    std::array<GLuint, 5> gloss_textures;  // metallic, roughness, and the three of normals; 0: none
   };
   struct Object {
     bool moves;
@@ -31,11 +35,14 @@ class GlScene {
   const std::vector<Object>& objects() const { return objects_; }
   GLuint vertices() const { return vertex_array_; }
 
+  /// A texture of the scene, or another one that lives as long. 0 for null.
+  GLuint texture(const Texture* texture);
+
  private:
   struct Vertex;
   void add(const SceneObject& object, std::vector<Vertex>& vertices);
   void upload(const std::vector<Vertex>& vertices);
-  GLuint texture(const Texture* texture);
+  std::array<GLuint, 5> gloss_textures(const Gloss* gloss);
 
   std::vector<Object> objects_;
   std::map<const Texture*, GLuint> textures_;

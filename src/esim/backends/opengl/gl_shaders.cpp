@@ -40,6 +40,30 @@ void main() {
 }
 )";
 
+const char* const kMeanShader = R"(
+// Mean over the pixel's footprint, a parallelogram with the sides dx and dy, by probes on one level of the mip pyramid.
+// In squares of widths, which are 12 times the variance, its texels average over 1 and their interpolation over 2; that
+// of level 0 belongs to the image. The probes supply the rest: n of them at a distance s have the square width
+// (n^2 - 1) s^2. The anisotropic filters of drivers differ.
+float mean_over(sampler2D image, vec2 uv, vec2 dx, vec2 dy) {
+  vec2 size = vec2(textureSize(image, 0));
+  vec2 sides = clamp(vec2(length(dx * size), length(dy * size)), 1e-6, 1e6);
+  float major = max(sides.x, sides.y), minor = min(sides.x, sides.y);
+  float level = clamp(floor(log2(max(minor / 2, major / 8))), 0, float(textureQueryLevels(image) - 1));
+  float texel = exp2(level), blur = 3 * (1 - 1 / (texel * texel));
+  vec2 widths = sqrt(max(sides * sides / (texel * texel) - blur, 0));
+  vec2 probes = min(ceil(widths) + 1, 17);
+  vec2 distances = widths / sqrt(max(probes * probes - 1, 1)) * texel / sides;  // in sides
+  float sum = 0;
+  for (float j = 0; j < probes.y; ++j) {
+    vec2 row = uv + (j - 0.5 * (probes.y - 1)) * distances.y * dy;
+    for (float i = 0; i < probes.x; ++i)
+      sum += textureLod(image, row + (i - 0.5 * (probes.x - 1)) * distances.x * dx, level).r;
+  }
+  return sum / (probes.x * probes.y);
+}
+)";
+
 const char* const kSurfaceFragmentShader = R"(
 struct Light {
   vec4 place;     // xyz: direction to a sun, or position of a point light (w = 1), in the camera frame
@@ -62,28 +86,9 @@ uniform uint object;
 layout(location = 0) out vec4 seen;
 layout(location = 1) out uint which;
 
-// Mean over the pixel's footprint, a parallelogram with the sides dx and dy, by probes on one level of the mip pyramid.
-// In squares of widths, which are 12 times the variance, its texels average over 1 and their interpolation over 2; that
-// of level 0 belongs to the image. The probes supply the rest: n of them at a distance s have the square width
-// (n^2 - 1) s^2. The anisotropic filters of drivers differ.
-float mean_colour(sampler2D image) {
-  vec2 size = vec2(textureSize(image, 0)), dx = dFdx(uv), dy = dFdy(uv);
-  vec2 sides = clamp(vec2(length(dx * size), length(dy * size)), 1e-6, 1e6);
-  float major = max(sides.x, sides.y), minor = min(sides.x, sides.y);
-  float level = clamp(floor(log2(max(minor / 2, major / 8))), 0, float(textureQueryLevels(image) - 1));
-  float texel = exp2(level), blur = 3 * (1 - 1 / (texel * texel));
-  vec2 widths = sqrt(max(sides * sides / (texel * texel) - blur, 0));
-  vec2 probes = min(ceil(widths) + 1, 17);
-  vec2 distances = widths / sqrt(max(probes * probes - 1, 1)) * texel / sides;  // in sides
-  float sum = 0;
-  for (float j = 0; j < probes.y; ++j) {
-    vec2 row = uv + (j - 0.5 * (probes.y - 1)) * distances.y * dy;
-    for (float i = 0; i < probes.x; ++i)
-      sum += textureLod(image, row + (i - 0.5 * (probes.x - 1)) * distances.x * dx, level).r;
-  }
-  return sum / (probes.x * probes.y);
-}
+float mean_colour(sampler2D image) { return mean_over(image, uv, dFdx(uv), dFdy(uv)); }
 
+#ifndef GLOSSY
 float light_on_surface() {
   // On the visible side. A vertex normal of zero means a flat triangle.
   vec3 right = dFdx(point), down = dFdy(point), flat_normal = normalize(cross(right, down));
@@ -103,10 +108,20 @@ float light_on_surface() {
   }
   return sum;
 }
+#else
+vec2 reflected();
+#endif
 
 void main() {
   float colour = base * (has_base_texture ? mean_colour(base_texture) : 1.0);
+#ifdef GLOSSY
+  if (lit) {
+    vec2 light = reflected();
+    colour = colour * light.x + light.y;
+  }
+#else
   if (lit) colour *= light_on_surface();
+#endif
   colour += emission * (has_emission_texture ? mean_colour(emission_texture) : 1.0);
   float w = gl_FragCoord.w;
   seen = vec4(colour, w, dFdx(w), dFdy(w));

@@ -83,6 +83,12 @@ GlShadows::GlShadows(const Scene& scene, const GlScene& drawn) : drawn_(drawn), 
                     std::to_string(max_layers) +
                     " layers (six for each point light); use fewer lights, or engine: raycast");
   }
+  if (std::any_of(lighting_.points.begin(), lighting_.points.end(),
+                  [](const PointLight& light) { return light.object.has_value(); })) {
+    throw UserError(
+        "gl: the shadows of lights that objects carry are not supported by shadow maps; use engine: raycast, or "
+        "shadows: false");
+  }
   for (const SceneObject& object : scene.objects) {
     if (!object.moves) continue;
     Eigen::AlignedBox3f box;

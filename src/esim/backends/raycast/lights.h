@@ -14,6 +14,11 @@ namespace esim::inline backends::inline raycast {
 inline Lighting in_camera_frame(Lighting lighting, const PlacedGroup& world) {
   for (SunLight& sun : lighting.suns) sun.direction = world.R_camera_group * sun.direction.normalized();
   for (PointLight& point : lighting.points) point.position = world.R_camera_group * (point.position - world.camera);
+  for (AreaLight& area : lighting.areas) {
+    area.position = world.R_camera_group * (area.position - world.camera);
+    for (Eigen::Vector3f* const vector : {&area.half_u, &area.half_v, &area.direction})
+      *vector = world.R_camera_group * *vector;
+  }
   return lighting;
 }
 
@@ -94,56 +99,14 @@ struct SurfacePoints {
   }
 };
 
-/// The light on surfaces: the bracket of the formula in Lighting.
+inline constexpr float kNearestLamp = 1e-3F;  // m
+inline constexpr float kToLamp = 0.9999F;     // fraction of the distance: the lamp itself casts no shadow
+
+/// Finds which points of surfaces see a light.
 template <int K>
-class LightOnSurfaces {
+class ShadowRays {
  public:
-  /// `lighting` is in the camera frame.
-  LightOnSurfaces(const Lighting& lighting, const std::vector<PlacedGroup>& groups)
-      : lighting_(lighting), groups_(groups) {}
-
-  std::array<float, K> at(const SurfacePoints<K>& surface, std::uint32_t hits) const {
-    std::array<float, K> light;
-    light.fill(lighting_.ambient);
-    VectorLanes<K> to_light;
-    alignas(64) std::array<float, K> received;
-    for (const SunLight& sun : lighting_.suns) {
-      to_light.x.fill(-sun.direction.x()), to_light.y.fill(-sun.direction.y()), to_light.z.fill(-sun.direction.z());
-      for (unsigned i = 0; i < K; ++i) received[i] = sun.strength * std::max(0.0F, cosine(surface.normal, to_light, i));
-      add_what_arrives(surface, to_light, kInfinity, received, hits, light);
-    }
-    for (const PointLight& lamp : lighting_.points) {
-      for (unsigned i = 0; i < K; ++i) {
-        const float x = lamp.position.x() - surface.point.x[i], y = lamp.position.y() - surface.point.y[i],
-                    z = lamp.position.z() - surface.point.z[i];
-        const float squared = std::max(x * x + y * y + z * z, kNearestLamp * kNearestLamp);
-        to_light.x[i] = x, to_light.y[i] = y, to_light.z[i] = z;
-        received[i] =
-            lamp.strength * std::max(0.0F, cosine(surface.normal, to_light, i)) / (squared * std::sqrt(squared));
-      }
-      add_what_arrives(surface, to_light, kToLamp, received, hits, light);
-    }
-    return light;
-  }
-
- private:
-  static constexpr float kNearestLamp = 1e-3F;  // m
-  static constexpr float kToLamp = 0.9999F;     // fraction of the distance: the lamp itself casts no shadow
-
-  static float cosine(const VectorLanes<K>& n, const VectorLanes<K>& l, unsigned i) {
-    return n.x[i] * l.x[i] + n.y[i] * l.y[i] + n.z[i] * l.z[i];
-  }
-
-  void add_what_arrives(const SurfacePoints<K>& surface, const VectorLanes<K>& to_light, float reach,
-                        const std::array<float, K>& received, std::uint32_t hits, std::array<float, K>& light) const {
-    if (lighting_.shadows) {
-      for (unsigned i = 0; i < K; ++i) {
-        if (!(received[i] > 0)) hits &= ~(1U << i);
-      }
-      hits = visible(surface, to_light, reach, hits);
-    }
-    for (unsigned i = 0; i < K; ++i) light[i] += (hits >> i & 1U) != 0 ? received[i] : 0.0F;
-  }
+  explicit ShadowRays(const std::vector<PlacedGroup>& groups) : groups_(groups) {}
 
   /// Those of `lanes` whose points see the light: no triangle crosses the vector to it, up to `reach` times its length.
   std::uint32_t visible(const SurfacePoints<K>& surface, const VectorLanes<K>& to_light, float reach,
@@ -166,6 +129,7 @@ class LightOnSurfaces {
     return lanes;
   }
 
+ private:
   /// Whether any of the rays of `lanes` may meet the group's box.
   static bool may_meet(const PlacedGroup& group, const VectorLanes<K>& start, const VectorLanes<K>& to_light,
                        float reach, std::uint32_t lanes) {
@@ -203,8 +167,59 @@ class LightOnSurfaces {
     return found;
   }
 
-  const Lighting& lighting_;
   const std::vector<PlacedGroup>& groups_;
+};
+
+/// The light on surfaces: the bracket of the formula in Lighting.
+template <int K>
+class LightOnSurfaces {
+ public:
+  /// `lighting` is in the camera frame.
+  LightOnSurfaces(const Lighting& lighting, const std::vector<PlacedGroup>& groups)
+      : lighting_(lighting), shadow_rays_(groups) {}
+
+  std::array<float, K> at(const SurfacePoints<K>& surface, std::uint32_t hits) const {
+    std::array<float, K> light;
+    light.fill(lighting_.ambient);
+    VectorLanes<K> to_light;
+    alignas(64) std::array<float, K> received;
+    for (const SunLight& sun : lighting_.suns) {
+      to_light.x.fill(-sun.direction.x()), to_light.y.fill(-sun.direction.y()), to_light.z.fill(-sun.direction.z());
+      for (unsigned i = 0; i < K; ++i) received[i] = sun.strength * std::max(0.0F, cosine(surface.normal, to_light, i));
+      add_what_arrives(surface, to_light, kInfinity, received, hits, light);
+    }
+    for (const PointLight& lamp : lighting_.points) {
+      for (unsigned i = 0; i < K; ++i) {
+        const float x = lamp.position.x() - surface.point.x[i], y = lamp.position.y() - surface.point.y[i],
+                    z = lamp.position.z() - surface.point.z[i];
+        const float squared = std::max(x * x + y * y + z * z, kNearestLamp * kNearestLamp);
+        to_light.x[i] = x, to_light.y[i] = y, to_light.z[i] = z;
+        received[i] =
+            lamp.strength * std::max(0.0F, cosine(surface.normal, to_light, i)) / (squared * std::sqrt(squared));
+      }
+      add_what_arrives(surface, to_light, kToLamp, received, hits, light);
+    }
+    return light;
+  }
+
+ private:
+  static float cosine(const VectorLanes<K>& n, const VectorLanes<K>& l, unsigned i) {
+    return n.x[i] * l.x[i] + n.y[i] * l.y[i] + n.z[i] * l.z[i];
+  }
+
+  void add_what_arrives(const SurfacePoints<K>& surface, const VectorLanes<K>& to_light, float reach,
+                        const std::array<float, K>& received, std::uint32_t hits, std::array<float, K>& light) const {
+    if (lighting_.shadows) {
+      for (unsigned i = 0; i < K; ++i) {
+        if (!(received[i] > 0)) hits &= ~(1U << i);
+      }
+      hits = shadow_rays_.visible(surface, to_light, reach, hits);
+    }
+    for (unsigned i = 0; i < K; ++i) light[i] += (hits >> i & 1U) != 0 ? received[i] : 0.0F;
+  }
+
+  const Lighting& lighting_;
+  ShadowRays<K> shadow_rays_;
 };
 
 }  // namespace esim::inline backends::inline raycast

@@ -190,13 +190,16 @@ class RaycastRenderer final : public ProcessorRenderer {
     const SeenSurfaces<K> centre{work.rays.packet, work.rays.triangle, work.rays.light};
     Rays<K> corner;
     corner.block = work.rays.block, corner.first = work.rays.first;
+    corner.first_material = work.rays.first_material;
     GroupRotations<K> rotations;
     std::uint32_t edges = 0;
     for (const Eigen::Vector2f& place : kCorners) {
       trace(moment, views, area_.side * place, corner);
       corner.light = work.rays.light;
-      if (const std::uint32_t lit = corner.hits & work.rays.lit; shadows && lit != 0)
+      if (const std::uint32_t lit = corner.hits & work.rays.lit; shadows && lit != 0) {
+        if (moment.glossy()) shading_.locate(moment, rotations, 1, corner);
         shading_.light_up(moment, rotations, lit, corner);
+      }
       edges |= pixels_on_edges<K>(*moment.triangles, *corner.block, corner.first, centre,
                                   {corner.packet, corner.triangle, corner.light});
     }

@@ -70,6 +70,11 @@ class RaycastScene {
     return static_cast<std::uint32_t>((1 + colour) * material_count_);
   }
 
+  /// The view of an environment to which a first material belongs: 0 for luminance, 1 + colour.
+  std::uint8_t view(std::uint32_t first_material) const {
+    return static_cast<std::uint8_t>(first_material / material_count_);
+  }
+
   const std::optional<Lighting>& lighting() const { return lighting_; }
 
  private:

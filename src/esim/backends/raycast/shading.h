@@ -7,7 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "esim/backends/raycast/lights.h"
+#include "esim/backends/raycast/glossy_light.h"
+#include "esim/backends/raycast/sky.h"
 #include "esim/render/bands.h"
 #include "esim/render/motion_field.h"
 
@@ -20,12 +21,19 @@ struct Moment {
   std::vector<PlacedGroup> groups;
   std::shared_ptr<const SceneTriangles> triangles;
   std::optional<Lighting> lighting;  // in the camera frame
+  std::optional<Sky> sky;            // instead of the background
 
-  Moment(const RaycastScene& scene, const RenderRequest& request) : lighting(scene.lighting()) {
+  Moment(const RaycastScene& scene, const RenderRequest& request) {
     PlacedGroups placed = scene.place(request);
     groups = std::move(placed.groups), triangles = std::move(placed.triangles);
-    if (lighting) lighting = in_camera_frame(*lighting, groups[0]);
+    if (!scene.lighting()) return;
+    std::vector<SE3> objects;
+    for (const Kinematics& object : request.objects) objects.push_back(object.T_world_body);
+    lighting = in_camera_frame(lighting_at(*scene.lighting(), request.t, objects), groups[0]);
+    if (lighting->environment_visible) sky.emplace(*lighting->environment, groups[0].R_group_camera);
   }
+
+  bool glossy() const { return lighting && lighting->glossy; }
 };
 
 /// Adds to V how the surfaces of deforming objects move in the objects' frames.
@@ -76,7 +84,8 @@ struct Rays {
   TextureLookup<K> at;
   alignas(64) std::array<std::uint32_t, K> material;
   SurfaceColours<K> colours;
-  alignas(64) std::array<float, K> light;  // that the surface receives
+  alignas(64) std::array<float, K> light;  // that the surface receives: the factor on its base colour
+  alignas(64) std::array<float, K> shine;  // what a glossy surface reflects in addition; 0 if it is not lit
   alignas(64) std::array<float, K> irradiance;
 };
 
@@ -92,13 +101,15 @@ class Shading {
   void shade(const Moment& moment, std::span<W> batch, float footprint) const {
     GroupRotations<K> rotations;
     for (W& work : batch) locate(moment, rotations, footprint, work.rays);
-    for (W& work : batch) shade(moment, rotations, work.rays);
+    for (W& work : batch) shade(moment, rotations, footprint, work.rays);
   }
 
-  /// Computes the light on the surfaces that the lanes of `lit` have hit.
+  /// Computes the light on the surfaces that the lanes of `lit` have hit. If surfaces are glossy, locate() must have
+  /// been called.
   template <int K>
   void light_up(const Moment& moment, GroupRotations<K>& rotations, std::uint32_t lit, Rays<K>& rays) const {
     rotations.select(rays.packet, moment.groups);
+    if (moment.glossy()) return light_up_glossy(moment, rotations, lit, rays);
     SurfacePoints<K> surface;
     surface.take(*moment.triangles, rays.packet, rays.triangle, rotations);
     const std::array<float, K> light = LightOnSurfaces<K>(*moment.lighting, moment.groups).at(surface, lit);
@@ -123,22 +134,63 @@ class Shading {
   void colour(const Moment& moment, GroupRotations<K>& rotations, Rays<K>& rays) const {
     rays.colours.look_up(scene_, rays.material, rays.at, rays.hits);
     rays.light.fill(1);
+    if (moment.glossy()) rays.shine.fill(0);
     rays.lit = moment.lighting ? rays.hits & ~rays.colours.unlit : 0;
     if (rays.lit != 0) light_up(moment, rotations, rays.lit, rays);
   }
 
+  /// The views of the environment that lanes see (see Environment::view_offset).
+  template <int K>
+  std::array<std::uint8_t, K> views_of(const std::uint32_t* first_material) const {
+    std::array<std::uint8_t, K> views{};
+    if (first_material == nullptr) return views;
+    for (unsigned i = 0; i < K; ++i) views[i] = scene_.view(first_material[i]);
+    return views;
+  }
+
  private:
   template <int K>
-  void shade(const Moment& moment, GroupRotations<K>& rotations, Rays<K>& rays) const {
+  void light_up_glossy(const Moment& moment, const GroupRotations<K>& rotations, std::uint32_t lit,
+                       Rays<K>& rays) const {
+    GlossySurface<K> surface;
+    surface.take(scene_, *moment.triangles, rays.packet, rays.triangle, rays.material, rays.at, rotations, lit);
+    const Reflected<K> reflected =
+        LightOnGlossySurfaces<K>(*moment.lighting, moment.groups).at(surface, views_of<K>(rays.first_material), lit);
+    for (unsigned i = 0; i < K; ++i) {
+      rays.light[i] = (lit >> i & 1U) != 0 ? reflected.of_base[i] : rays.light[i];
+      rays.shine[i] = (lit >> i & 1U) != 0 ? reflected.other[i] : rays.shine[i];
+    }
+  }
+
+  template <int K>
+  void shade(const Moment& moment, GroupRotations<K>& rotations, float footprint, Rays<K>& rays) const {
     colour(moment, rotations, rays);
-    const SurfaceColours<K>& colours = rays.colours;
+    SurfaceColours<K>& colours = rays.colours;
     const std::uint32_t hits = rays.hits;
+    if (moment.glossy()) {
+      for (unsigned i = 0; i < K; ++i) colours.emission[i] += rays.shine[i];
+    }
     const float background = background_;
 #pragma omp simd
     for (unsigned i = 0; i < K; ++i) {
       const float seen = colours.base[i] * rays.light[i] + colours.emission[i];
       rays.irradiance[i] = (hits >> i & 1U) != 0 ? seen : background;
     }
+    if (moment.sky && hits != kEveryLane<K>) show_sky(*moment.sky, footprint, rays);
+  }
+
+  template <int K>
+  void show_sky(const Sky& sky, float footprint, Rays<K>& rays) const {
+    SkyRays<K> seen;
+    const RayBlock& block = *rays.block;
+    for (unsigned i = 0; i < K; ++i) {
+      const unsigned k = static_cast<unsigned>(rays.first) + i;
+      seen.x[i] = rays.packet.bearing_x[i], seen.y[i] = rays.packet.bearing_y[i];
+      seen.dx_du[i] = footprint * block.dx_du[k], seen.dx_dv[i] = footprint * block.dx_dv[k];
+      seen.dy_du[i] = footprint * block.dy_du[k], seen.dy_dv[i] = footprint * block.dy_dv[k];
+    }
+    const std::array<float, K> radiance = sky.radiance<K>(seen, views_of<K>(rays.first_material));
+    for (unsigned i = 0; i < K; ++i) rays.irradiance[i] = (rays.hits >> i & 1U) != 0 ? rays.irradiance[i] : radiance[i];
   }
 
   const RaycastScene& scene_;

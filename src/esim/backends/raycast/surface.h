@@ -116,6 +116,20 @@ void locate_on_textures(const Packet<K>& packet, const RayBlock& block, int firs
   }
 }
 
+/// Mean of factor times a texture over each footprint.
+template <int K>
+void fill_mean(const Texture* texture, float factor, const TextureLookup<K>& at, std::uint32_t lanes,
+               std::array<float, K>& out) {
+  if (texture == nullptr || factor == 0) {
+#pragma omp simd
+    for (unsigned i = 0; i < K; ++i) out[i] = (lanes >> i & 1U) != 0 ? factor : out[i];
+    return;
+  }
+  const std::array<float, K> light = texture->template sample<K>(at, lanes);
+#pragma omp simd
+  for (unsigned i = 0; i < K; ++i) out[i] = (lanes >> i & 1U) != 0 ? factor * light[i] : out[i];
+}
+
 /// The base colour and the emission of the surfaces, and whether they are lit.
 template <int K>
 struct SurfaceColours {
@@ -131,24 +145,10 @@ struct SurfaceColours {
       const std::uint32_t same = lanes_equal<K>(materials.data(), current) & hits;
       hits &= ~same;
       const Material& material = scene.material(current);
-      fill(material.texture.get(), material.base, at, same, base);
-      fill(material.emission_texture.get(), material.emission, at, same, emission);
+      fill_mean<K>(material.texture.get(), material.base, at, same, base);
+      fill_mean<K>(material.emission_texture.get(), material.emission, at, same, emission);
       if (material.unlit) unlit |= same;
     }
-  }
-
- private:
-  /// Mean of factor times a texture over each footprint.
-  static void fill(const Texture* texture, float factor, const TextureLookup<K>& at, std::uint32_t lanes,
-                   std::array<float, K>& out) {
-    if (texture == nullptr || factor == 0) {
-#pragma omp simd
-      for (unsigned i = 0; i < K; ++i) out[i] = (lanes >> i & 1U) != 0 ? factor : out[i];
-      return;
-    }
-    const std::array<float, K> light = texture->template sample<K>(at, lanes);
-#pragma omp simd
-    for (unsigned i = 0; i < K; ++i) out[i] = (lanes >> i & 1U) != 0 ? factor * light[i] : out[i];
   }
 };
 

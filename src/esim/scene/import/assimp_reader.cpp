@@ -109,6 +109,21 @@ class Converter {
     return texture;
   }
 
+  /// How the material shines, if the file says so; otherwise it is a rough dielectric.
+  void read_gloss(const aiMaterial& source, GraphMaterial& material) {
+    source.Get(AI_MATKEY_ROUGHNESS_FACTOR, material.roughness);
+    source.Get(AI_MATKEY_METALLIC_FACTOR, material.metallic);
+    // As with the base colour, a texture alone counts.
+    material.roughness_texture = texture(source, aiTextureType_DIFFUSE_ROUGHNESS);
+    if (material.roughness_texture.image >= 0) material.roughness = 1;
+    material.metallic_texture = texture(source, aiTextureType_METALNESS);
+    if (material.metallic_texture.image >= 0) material.metallic = 1;
+    material.normal_texture = texture(source, aiTextureType_NORMALS);
+    const bool heights = source.GetTextureCount(aiTextureType_HEIGHT) > 0;
+    if (material.normal_texture.image >= 0 || heights) ++graph_.relief;
+    if (material.normal_texture.image < 0 && heights) ++graph_.bump_maps;
+  }
+
   void read_materials() {
     for (unsigned i = 0; i < scene_.mNumMaterials; ++i) {
       const aiMaterial& source = *scene_.mMaterials[i];
@@ -123,10 +138,12 @@ class Converter {
         material.emission = {colour.r, colour.g, colour.b};
       material.emission_texture = texture(source, aiTextureType_EMISSIVE);
       if (material.emission_texture.image >= 0) material.emission.setOnes();
-      if (source.GetTextureCount(aiTextureType_NORMALS) + source.GetTextureCount(aiTextureType_HEIGHT) > 0)
-        ++graph_.normal_maps;
+      read_gloss(source, material);
       if (!material.base.allFinite() || !material.emission.allFinite())
         fail_scene(file_, fmt::format("a colour of material {} is not finite", material.name));
+      if (!std::isfinite(material.roughness) || !std::isfinite(material.metallic))
+        fail_scene(file_,
+                   fmt::format("the roughness or the metallic factor of material {} is not finite", material.name));
       graph_.materials.push_back(std::move(material));
     }
     if (graph_.materials.empty()) graph_.materials.push_back({.name = "none"});

@@ -8,6 +8,7 @@
 #include <set>
 
 #include "esim/scene/import/deforming_mesh.h"
+#include "esim/scene/import/gloss_textures.h"
 #include "esim/scene/import/motion_samples.h"
 #include "esim/scene/import/texture_store.h"
 
@@ -54,11 +55,14 @@ struct Materials {
 /// Transforms the mesh of a node to the frame of its object, and appends it.
 class MeshJoiner {
  public:
-  explicit MeshJoiner(const std::filesystem::path& file) : file_(file) {}
+  MeshJoiner(const std::filesystem::path& file, SurfaceModel model) : file_(file), model_(model) {}
 
   void append(const Mesh& part, const Eigen::Matrix4d& T_object_node) {
     const Eigen::Matrix3f A = T_object_node.topLeftCorner<3, 3>().cast<float>();
-    const Eigen::Matrix3f for_normals = cofactors(T_object_node.topLeftCorner<3, 3>()).cast<float>();
+    // A mirroring node turns triangles inside out, which matters only to the relief of their front (glTF 2.0, 3.7.4).
+    const bool turn = model_ == SurfaceModel::glossy && A.determinant() < 0;
+    const Eigen::Matrix3f for_normals =
+        (turn ? -1.0F : 1.0F) * cofactors(T_object_node.topLeftCorner<3, 3>()).cast<float>();
     const Eigen::Vector3f t = T_object_node.topRightCorner<3, 1>().cast<float>();
 
     const auto first = static_cast<std::uint32_t>(mesh_.vertices.size());
@@ -74,9 +78,14 @@ class MeshJoiner {
       mesh_.normals.push_back(usable ? Eigen::Vector3f(normal / length) : Eigen::Vector3f::Zero());
       any_normals_ |= usable;
     }
-    for (const auto& triangle : part.triangles)
-      mesh_.triangles.push_back({first + triangle[0], first + triangle[1], first + triangle[2]});
-    mesh_.texture_uv.insert(mesh_.texture_uv.end(), part.texture_uv.begin(), part.texture_uv.end());
+    for (std::size_t i = 0; i < part.triangles.size(); ++i) {
+      const auto& [a, b, c] = part.triangles[i];
+      mesh_.triangles.push_back({first + a, first + b, first + c});
+      mesh_.texture_uv.push_back(part.texture_uv[i]);
+      if (!turn) continue;
+      std::swap(mesh_.triangles.back()[1], mesh_.triangles.back()[2]);
+      std::swap(mesh_.texture_uv.back()[1], mesh_.texture_uv.back()[2]);
+    }
     mesh_.material.insert(mesh_.material.end(), part.material.begin(), part.material.end());
   }
 
@@ -98,6 +107,7 @@ class MeshJoiner {
   }
 
   const std::filesystem::path& file_;
+  SurfaceModel model_;
   Mesh mesh_;
   bool any_normals_ = false;
 };
@@ -127,26 +137,37 @@ std::vector<int> movers(const SceneGraph& graph, const NodeTransforms& transform
   return result;
 }
 
-Materials convert_materials(const SceneGraph& graph, TextureStore& textures) {
+Materials convert_materials(const SceneGraph& graph, TextureStore& textures, SurfaceModel model) {
   Materials materials;
+  GlossTextures gloss_textures(textures);
   for (const GraphMaterial& source : graph.materials) {
+    const bool glossy = model == SurfaceModel::glossy && !source.unlit;
+    const std::shared_ptr<const Gloss> gloss = glossy ? gloss_textures.convert(source) : nullptr;
     materials.luminance.push_back(convert(source, textures, View::luminance));
+    materials.luminance.back().gloss = gloss;
     if (textures.look() == SceneLook::luminance) continue;
-    for (const View view : {View::red, View::green, View::blue})
-      materials.coloured[static_cast<std::size_t>(view)].push_back(convert(source, textures, view));
+    for (const View view : {View::red, View::green, View::blue}) {
+      std::vector<Material>& coloured = materials.coloured[static_cast<std::size_t>(view)];
+      coloured.push_back(convert(source, textures, view));
+      coloured.back().gloss = gloss;
+    }
   }
   return materials;
 }
 
-void give_warnings(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn) {
+void give_warnings(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
+                   SurfaceModel model) {
   constexpr std::size_t kMax = 10;  // one line each; a scene can have thousands of faults
-  for (std::size_t i = 0; i < std::min(graph.warnings.size(), kMax); ++i) warn(graph.warnings[i]);
-  if (graph.warnings.size() > kMax)
-    warn(
-        fmt::format("scene {}: {} more warnings of this kind", file.filename().string(), graph.warnings.size() - kMax));
-  if (graph.normal_maps > 0)
-    warn(fmt::format("scene {}: {} of its materials have a normal or bump map, which is ignored",
-                     file.filename().string(), graph.normal_maps));
+  const bool glossy = model == SurfaceModel::glossy;
+  std::vector<std::string> warnings = graph.warnings;
+  if (glossy) warnings.insert(warnings.end(), graph.gloss_warnings.begin(), graph.gloss_warnings.end());
+  for (std::size_t i = 0; i < std::min(warnings.size(), kMax); ++i) warn(warnings[i]);
+  if (warnings.size() > kMax)
+    warn(fmt::format("scene {}: {} more warnings of this kind", file.filename().string(), warnings.size() - kMax));
+  const int ignored = glossy ? graph.bump_maps : graph.relief;
+  if (ignored > 0)
+    warn(fmt::format("scene {}: {} of its materials have a {}, which is ignored", file.filename().string(), ignored,
+                     glossy ? "bump map of heights" : "normal or bump map"));
 }
 
 /// All parts of a graph.
@@ -161,12 +182,14 @@ std::vector<GraphPart> parts_of(const SceneGraph& graph) {
 /// Splits a graph into objects.
 class Flattener {
  public:
-  Flattener(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn, SceneLook look)
+  Flattener(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn, SceneLook look,
+            SurfaceModel model)
       : graph_(graph),
         file_(file),
+        model_(model),
         transforms_(graph, file),
         textures_(graph, file.parent_path(), warn, look),
-        materials_(convert_materials(graph, textures_)) {}
+        materials_(convert_materials(graph, textures_, model)) {}
 
   SceneFile objects(const WarningHandler& warn) {
     result_.animation = transforms_.span();
@@ -194,7 +217,7 @@ class Flattener {
       add_materials(object.mesh);
       return object;
     }
-    MeshJoiner joiner(file_);
+    MeshJoiner joiner(file_, model_);
     for (const GraphPart& part : parts) append_rest(part, Eigen::Matrix4d::Identity(), joiner);
     object.mesh = joiner.take(materials_);
     return object;
@@ -239,7 +262,7 @@ class Flattener {
     const SceneMotion& motion = sampled.rigid ? sampled.motion : at_rest;
     const Eigen::Matrix4d T_object_world = motion.front().T_world_object.inverse().matrix();
 
-    MeshJoiner rigid(file_);
+    MeshJoiner rigid(file_, model_);
     DeformingMesh scaled(graph_, transforms_, file_);
     for (const GraphPart& part : parts) {
       if (deforms(graph_, transforms_, part)) continue;
@@ -283,6 +306,7 @@ class Flattener {
 
   const SceneGraph& graph_;
   const std::filesystem::path& file_;
+  SurfaceModel model_;
   NodeTransforms transforms_;
   TextureStore textures_;
   Materials materials_;
@@ -293,17 +317,17 @@ class Flattener {
 }  // namespace
 
 SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
-                  SceneLook look) {
+                  SceneLook look, SurfaceModel model) {
   check_size(graph, file);
-  give_warnings(graph, file, warn);
-  return Flattener(graph, file, warn, look).objects(warn);
+  give_warnings(graph, file, warn, model);
+  return Flattener(graph, file, warn, look, model).objects(warn);
 }
 
 SceneObject flatten_joined(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
-                           SceneLook look, bool plays) {
+                           SceneLook look, SurfaceModel model, bool plays) {
   check_size(graph, file);
-  give_warnings(graph, file, warn);
-  return Flattener(graph, file, warn, look).joined(file.stem().string(), plays);
+  give_warnings(graph, file, warn, model);
+  return Flattener(graph, file, warn, look, model).joined(file.stem().string(), plays);
 }
 
 }  // namespace esim::inline scene

@@ -13,11 +13,11 @@ namespace esim::inline scene {
 /// frame, and deforms. Meshes with moving joints, or with morph targets of varying weight, are objects of their own,
 /// with the name of their node: with joints in the world's frame, otherwise in that of the animated node.
 SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
-                  SceneLook look);
+                  SceneLook look, SurfaceModel model);
 
 /// The complete graph as one object in the world's frame, which deforms if it `plays` and anything in it is animated.
 /// Its shape is that at the start of the animation.
 SceneObject flatten_joined(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
-                           SceneLook look, bool plays);
+                           SceneLook look, SurfaceModel model, bool plays);
 
 }  // namespace esim::inline scene

@@ -37,6 +37,8 @@ void archive(Archive& a, GraphTexture& o) {
 template <class Archive>
 void archive(Archive& a, GraphMaterial& o) {
   a(o.name), a(o.base), a(o.base_texture), a(o.emission), a(o.emission_texture), a(o.unlit);
+  a(o.metallic), a(o.roughness), a(o.reflectance), a(o.edge_reflectance);
+  a(o.metallic_texture), a(o.roughness_texture), a(o.normal_texture), a(o.normal_scale);
 }
 
 template <class Archive>
@@ -46,8 +48,8 @@ void archive(Archive& a, GraphCamera& o) {
 
 template <class Archive>
 void archive(Archive& a, SceneGraph& o) {
-  a(o.nodes), a(o.meshes), a(o.materials), a(o.images), a(o.cameras), a(o.ignores_alpha), a(o.normal_maps),
-      a(o.warnings), a(o.files);
+  a(o.nodes), a(o.meshes), a(o.materials), a(o.images), a(o.cameras), a(o.ignores_alpha), a(o.relief), a(o.bump_maps),
+      a(o.warnings), a(o.gloss_warnings), a(o.files);
 }
 
 /// Whether a type is stored as its bytes.

@@ -76,6 +76,12 @@ struct GraphMaterial {
   Eigen::Vector3f emission = Eigen::Vector3f::Zero();
   GraphTexture emission_texture{};
   bool unlit = false;
+
+  // As in Gloss. A roughness is in the texture's green channel, a metallic factor in its blue one.
+  float metallic = 0, roughness = 1, reflectance = 0.04F, edge_reflectance = 1;
+  GraphTexture metallic_texture{}, roughness_texture{};
+  GraphTexture normal_texture{};
+  float normal_scale = 1;
 };
 
 struct GraphCamera {
@@ -94,9 +100,11 @@ struct SceneGraph {
   std::vector<GraphImage> images;
   std::vector<GraphCamera> cameras;
   bool ignores_alpha = false;  ///< whether surfaces of the format are opaque by default
-  int normal_maps = 0;         ///< number of materials with a normal map, which is ignored
+  int relief = 0;              ///< number of materials with a normal map or a bump map
+  int bump_maps = 0;           ///< of which this number has only heights, which are not supported
   std::vector<std::string> warnings;
-  std::vector<std::string> files;  ///< that another process opened to read the scene
+  std::vector<std::string> gloss_warnings;  ///< of what matters only if surfaces shine
+  std::vector<std::string> files;           ///< that another process opened to read the scene
 };
 
 /// Limits of a scene, so that a small file cannot request gigabytes.

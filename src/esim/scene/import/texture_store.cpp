@@ -67,9 +67,7 @@ CodedTexture TextureStore::read(const GraphTexture& slot) const {
 TextureStore::Views TextureStore::views_of(const GraphTexture& slot, const Eigen::Vector3f& factor) {
   const bool colour = look_ == SceneLook::colour;
   Planes planes = decoded(read(slot), colour || !is_grey(factor));
-  texel_count_ += planes[0].size();
-  if (texel_count_ > kMaxSceneTexels)
-    throw UserError(fmt::format("the textures have more than {} texels in total; make them smaller", kMaxSceneTexels));
+  count_texels(planes);
   Views views;
   const auto keep = [&](View view, const Image<float>& image) {
     views[static_cast<std::size_t>(view)] = std::make_shared<const Texture>(image, slot.wrap_u, slot.wrap_v);
@@ -111,8 +109,29 @@ std::shared_ptr<const CodedTexture> TextureStore::coded(const GraphTexture& slot
   return entry->second;
 }
 
-void TextureStore::warn_failed(const std::string& material, const UserError& error) const {
-  warn_(fmt::format("material {}: {}; its surfaces are grey", material, error.what()));
+Planes TextureStore::numbers(const GraphTexture& slot, const std::string& material, const std::string& assumed) {
+  Planes planes;
+  try {
+    const CodedTexture image = read(slot);
+    check_size(image.bytes, image.name);
+    decode_planes(image.bytes, image.name, Encoding::linear, true, planes);
+    count_texels(planes);
+    ++image_count_;
+  } catch (const UserError& error) {
+    warn_failed(material, error, assumed);
+    planes.clear();
+  }
+  return planes;
+}
+
+void TextureStore::count_texels(const Planes& planes) {
+  texel_count_ += planes[0].size();
+  if (texel_count_ > kMaxSceneTexels)
+    throw UserError(fmt::format("the textures have more than {} texels in total; make them smaller", kMaxSceneTexels));
+}
+
+void TextureStore::warn_failed(const std::string& material, const UserError& error, const std::string& assumed) const {
+  warn_(fmt::format("material {}: {}; {}", material, error.what(), assumed));
 }
 
 }  // namespace esim::inline scene

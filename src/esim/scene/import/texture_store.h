@@ -33,6 +33,12 @@ class TextureStore {
   /// The encoded image. Null as above; the bytes are not checked.
   std::shared_ptr<const CodedTexture> coded(const GraphTexture& slot, const std::string& material);
 
+  /// An image of numbers, not of light: its R, G and B from 0 to 1 as the file has them. Empty if it is missing, not
+  /// allowed or unreadable, after a warning that names the material and says what is `assumed` instead.
+  Planes numbers(const GraphTexture& slot, const std::string& material, const std::string& assumed);
+
+  const WarningHandler& warning() const { return warn_; }
+
   /// Number of images that were read.
   std::size_t image_count() const { return image_count_; }
 
@@ -41,7 +47,9 @@ class TextureStore {
 
   Views views_of(const GraphTexture& slot, const Eigen::Vector3f& factor);
   CodedTexture read(const GraphTexture& slot) const;
-  void warn_failed(const std::string& material, const UserError& error) const;
+  void warn_failed(const std::string& material, const UserError& error,
+                   const std::string& assumed = "its surfaces are grey") const;
+  void count_texels(const Planes& planes);
 
   const SceneGraph& graph_;
   std::filesystem::path folder_;

@@ -26,6 +26,8 @@ class FragmentShading {
   void shade(const CellSurfaces& surfaces, const ImageCell& cell, std::span<const Fragment> fragments, bool mosaic) {
     base_.resize(fragments.size()), emission_.resize(fragments.size()), light_.resize(fragments.size());
     lit_.resize(fragments.size());
+    mosaic_ = mosaic;
+    if (moment_.glossy()) shine_.resize(fragments.size());
     for (std::size_t first = 0; first < fragments.size(); first += K * kBatch) {
       const std::span<const Fragment> some = fragments.subspan(first, std::min(K * kBatch, fragments.size() - first));
       const std::size_t packets = (some.size() + K - 1) / K;
@@ -42,9 +44,13 @@ class FragmentShading {
         std::copy_n(rays.colours.emission.begin(), count, emission_.begin() + static_cast<std::ptrdiff_t>(begin));
         std::copy_n(rays.light.begin(), count, light_.begin() + static_cast<std::ptrdiff_t>(begin));
         for (std::size_t i = 0; i < count; ++i) lit_[begin + i] = (rays.lit >> i & 1U) != 0;
+        if (moment_.glossy())
+          std::copy_n(rays.shine.begin(), count, shine_.begin() + static_cast<std::ptrdiff_t>(begin));
       }
     }
     if (moment_.lighting && moment_.lighting->shadows) smooth_shadows(surfaces, cell, fragments);
+    if (!moment_.glossy()) return;
+    for (std::size_t f = 0; f < fragments.size(); ++f) emission_[f] += shine_[f];
   }
 
   float irradiance(std::size_t fragment) const { return base_[fragment] * light_[fragment] + emission_[fragment]; }
@@ -141,9 +147,11 @@ class FragmentShading {
     light_up(surfaces, cell, fragments);
     for (std::size_t p = 0; p < probes_.size();) {
       const std::size_t f = probes_[p].fragment;
-      float sum = 0, count = 0;
-      for (; p < probes_.size() && probes_[p].fragment == f; ++p) sum += probes_[p].light, count += 1;
+      float sum = 0, shine = 0, count = 0;
+      for (; p < probes_.size() && probes_[p].fragment == f; ++p)
+        sum += probes_[p].light, shine += probes_[p].shine, count += 1;
       light_[f] = sum / count;
+      if (moment_.glossy()) shine_[f] = shine / count;
     }
   }
 
@@ -157,16 +165,20 @@ class FragmentShading {
         at[i] = fragments[probes_[first + i].fragment];
         at[i].centroid = probes_[first + i].place;
       }
-      aim(surfaces, cell, std::span(at).first(count), false, work);
+      aim(surfaces, cell, std::span(at).first(count), mosaic_ && moment_.glossy(), work);
+      if (moment_.glossy()) shading_.template locate<K>(moment_, rotations_, 1, work.rays);
       shading_.template light_up<K>(moment_, rotations_, work.rays.hits, work.rays);
-      for (std::size_t i = 0; i < count; ++i) probes_[first + i].light = work.rays.light[i];
+      for (std::size_t i = 0; i < count; ++i) {
+        probes_[first + i].light = work.rays.light[i];
+        if (moment_.glossy()) probes_[first + i].shine = work.rays.shine[i];
+      }
     }
   }
 
   struct Probe {
     std::size_t fragment;
     PixelPoint place;
-    float light = 0;
+    float light = 0, shine = 0;
   };
 
   const RaycastScene& scene_;
@@ -178,9 +190,10 @@ class FragmentShading {
   GroupRotations<K> rotations_;
 
   // Of each fragment.
-  std::vector<float> base_, emission_, light_;
+  std::vector<float> base_, emission_, light_, shine_;
   std::vector<std::uint8_t> lit_;
 
+  bool mosaic_ = false;
   std::vector<Probe> probes_;
   std::vector<std::size_t> samples_of_;
 };

@@ -40,6 +40,45 @@ class RasterRenderer final : public ProcessorRenderer {
     });
   }
 
+  /// What is behind the surfaces of a cell: the background, or the sky, which is looked up for K pixels at a time.
+  template <int K>
+  class Backdrop {
+   public:
+    Backdrop(const RasterRenderer& renderer, const Moment& moment, const ImageCell& cell)
+        : renderer_(renderer), moment_(moment), cell_(cell) {}
+
+    float at(int pixel) {
+      if (!moment_.sky) return renderer_.background_;
+      if (const int first = pixel / K * K; first != first_) look_up(first);
+      return radiance_[static_cast<std::size_t>(pixel % K)];
+    }
+
+   private:
+    void look_up(int first) {
+      first_ = first;
+      SkyRays<K> rays;
+      const float per_side = 1 / renderer_.side_;
+      std::array<std::uint32_t, K> first_material;
+      for (std::size_t i = 0; i < K; ++i) {
+        const std::size_t k = static_cast<std::size_t>(first) + i;
+        rays.x[i] = cell_.x[k], rays.y[i] = cell_.y[k];
+        rays.dx_du[i] = per_side * cell_.dx_du[k], rays.dx_dv[i] = per_side * cell_.dx_dv[k];
+        rays.dy_du[i] = per_side * cell_.dy_du[k], rays.dy_dv[i] = per_side * cell_.dy_dv[k];
+        const int column = static_cast<int>(k) % ImageCell::kWidth, row = static_cast<int>(k) / ImageCell::kWidth;
+        first_material[i] = renderer_.scene_->first_material(colour_at(column, row));
+      }
+      const Shading shading(*renderer_.scene_, 0);
+      radiance_ = moment_.sky->template radiance<K>(
+          rays, shading.views_of<K>(renderer_.mosaic_ ? first_material.data() : nullptr));
+    }
+
+    const RasterRenderer& renderer_;
+    const Moment& moment_;
+    const ImageCell& cell_;
+    int first_ = -1;
+    std::array<float, K> radiance_{};
+  };
+
   template <int K>
   void render_band(const Moment& moment, const Tile& band, Sample& sample) const {
     constexpr int kWidth = ImageCell::kWidth, kHeight = ImageCell::kHeight;
@@ -66,7 +105,7 @@ class RasterRenderer final : public ProcessorRenderer {
           }
         }
         shading.shade(surfaces, cell, fragments, mosaic_);
-        add_up(shading, fragments, left, top, part, sample.irradiance);
+        add_up(shading, fragments, Backdrop<K>(*this, moment, cell), left, top, part, sample.irradiance);
       }
     }
   }
@@ -82,8 +121,8 @@ class RasterRenderer final : public ProcessorRenderer {
 
   /// Sums the fragments of each pixel, which are adjacent; the background fills what they leave.
   template <int K>
-  void add_up(const FragmentShading<K>& shading, std::span<const Fragment> fragments, int left, int top,
-              const CellPart& part, Image<float>& irradiance) const {
+  void add_up(const FragmentShading<K>& shading, std::span<const Fragment> fragments, Backdrop<K> backdrop, int left,
+              int top, const CellPart& part, Image<float>& irradiance) const {
     std::size_t next = 0;
     for (int row = part.rows.first; row <= part.rows.last; ++row) {
       for (int column = part.columns.first; column <= part.columns.last; ++column) {
@@ -91,7 +130,8 @@ class RasterRenderer final : public ProcessorRenderer {
         float sum = 0, area = 0;
         for (; next < fragments.size() && fragments[next].pixel == pixel; ++next)
           sum += fragments[next].area * shading.irradiance(next), area += fragments[next].area;
-        irradiance(left + column, top + row) = area > 1 - kSmallestArea ? sum / area : sum + (1 - area) * background_;
+        irradiance(left + column, top + row) =
+            area > 1 - kSmallestArea ? sum / area : sum + (1 - area) * backdrop.at(pixel);
       }
     }
   }

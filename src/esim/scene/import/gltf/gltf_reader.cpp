@@ -106,6 +106,51 @@ class GltfReader {
     return slot;
   }
 
+  /// All textures of a material are shown with the same coordinates: those of the first one that there is.
+  void share_coordinates(const char* what, const TextureSlot& slot, const std::string& material, TextureSlot& first) {
+    if (first.texture.image < 0 && slot.texture.image >= 0) first = slot;
+    if (slot.texture.image < 0 || (slot.coordinates == first.coordinates && slot.transform == first.transform)) return;
+    warn(fmt::format("material {}: its {} texture is shown with the texture coordinates of its base colour", material,
+                     what));
+  }
+
+  /// How the material shines: pbrMetallicRoughness, normalTexture, KHR_materials_ior and KHR_materials_specular.
+  void read_gloss(const Json& json, const Json* extensions, GraphMaterial& material, TextureSlot& first) {
+    const auto number = [&](const Json& of, const char* name, double otherwise) {
+      return static_cast<float>(document_.number(of, name, otherwise));
+    };
+    const auto extension = [&](const char* name) {
+      return extensions != nullptr ? GltfDocument::find(*extensions, name) : nullptr;
+    };
+    material.metallic = material.roughness = 1;
+    if (const Json* const pbr = GltfDocument::find(json, "pbrMetallicRoughness")) {
+      material.metallic = number(*pbr, "metallicFactor", 1), material.roughness = number(*pbr, "roughnessFactor", 1);
+      const TextureSlot both = texture_slot(*pbr, "metallicRoughnessTexture");
+      material.metallic_texture = material.roughness_texture = both.texture;
+      share_coordinates("roughness", both, material.name, first);
+    }
+    if (const Json* const normal = GltfDocument::find(json, "normalTexture")) {
+      const TextureSlot slot = texture_slot(json, "normalTexture");
+      material.normal_texture = slot.texture, material.normal_scale = number(*normal, "scale", 1);
+      share_coordinates("normal", slot, material.name, first);
+      ++graph_.relief;
+    }
+    if (const Json* const ior = extension("KHR_materials_ior")) {
+      const float index = number(*ior, "ior", 1.5), ratio = (index - 1) / (index + 1);
+      material.reflectance = index > 0 ? ratio * ratio : 1;
+    }
+    if (const Json* const specular = extension("KHR_materials_specular")) {
+      const Eigen::Vector3f colour = colour_of(document_.numbers(*specular, "specularColorFactor", {1, 1, 1}));
+      const float strength = number(*specular, "specularFactor", 1), mean = luminance(colour[0], colour[1], colour[2]);
+      material.reflectance = strength * std::min(material.reflectance * mean, 1.0F);
+      material.edge_reflectance = strength;
+      if (GltfDocument::find(*specular, "specularTexture") != nullptr ||
+          GltfDocument::find(*specular, "specularColorTexture") != nullptr)
+        graph_.gloss_warnings.push_back(fmt::format(
+            "material {}: its texture of KHR_materials_specular is not supported, and is ignored", material.name));
+    }
+  }
+
   void read_materials() {
     const Json& materials = document_.list("materials");
     for (std::size_t i = 0; i < materials.size(); ++i) {
@@ -133,12 +178,8 @@ class GltfReader {
         material.emission *= static_cast<float>(document_.number(*strength, "emissiveStrength", 1));
       const TextureSlot emission = texture_slot(json, "emissiveTexture");
       if (emission.texture.image >= 0) material.emission_texture = emission.texture;
-      if (base.texture.image < 0 && emission.texture.image >= 0) base = emission;
-      if (emission.texture.image >= 0 &&
-          (emission.coordinates != base.coordinates || emission.transform != base.transform))
-        warn(fmt::format("material {}: its emission texture is shown with the texture coordinates of its base colour",
-                         material.name));
-      if (GltfDocument::find(json, "normalTexture") != nullptr) ++graph_.normal_maps;
+      share_coordinates("emission", emission, material.name, base);
+      read_gloss(json, extensions, material, base);
       if (document_.text(json, "alphaMode", "OPAQUE") != "OPAQUE")
         warn(fmt::format("material {}: transparency is not supported; it is shown opaque", material.name));
       graph_.materials.push_back(std::move(material));

@@ -20,6 +20,7 @@ LIBRARIES = {
     r"blosc\.h": "Blosc::blosc",
     r"(cairo(-ft)?|ft2build)\.h": "Cairo::Cairo",
     r"dds/.*": "ros2_dds",
+    r"draco/.*": "draco::draco",
     r"embree[34]/.*": "embree",
     r"epoxy/.*": "Epoxy::epoxy",
     r"hdf5\.h": "HDF5::HDF5",

@@ -9,6 +9,7 @@ MODIFIED.npy.
 
 import math
 import os
+import struct
 import sys
 
 import bpy
@@ -150,6 +151,38 @@ def subdivided():
     bpy.ops.object.modifier_move_up(modifier="Subdivision")
 
 
+def write_pc2(path, frames):
+    """Vertices at frames (frames x vertices x 3) as a point cache."""
+    with open(path, "wb") as out:
+        out.write(struct.pack("<12siiffi", b"POINTCACHE2\0", 1, frames.shape[1], 0.0, 1.0, len(frames)))
+        out.write(frames.astype("<f4").tobytes())
+
+
+def write_mdd(path, frames):
+    with open(path, "wb") as out:
+        out.write(struct.pack(">ii", *frames.shape[:2]))
+        out.write((np.arange(len(frames)) / 24).astype(">f4").tobytes() + frames.astype(">f4").tobytes())
+
+
+def cached(kind):
+    """Vertices from a point cache, which moves them at random."""
+    thing = tube(empty_scene())
+    rest = np.array([tuple(vertex.co) for vertex in thing.data.vertices])
+    steps = np.random.default_rng(3).normal(size=(101, *rest.shape)) * 0.01
+    path = os.path.join(FOLDER, "cache." + kind)
+    {"pc2": write_pc2, "mdd": write_mdd}[kind](path, rest + np.cumsum(steps, axis=0))
+    modifier = thing.modifiers.new("Cache", "MESH_CACHE")
+    modifier.cache_format, modifier.filepath = kind.upper(), path
+
+
+def pc2_cache():
+    cached("pc2")
+
+
+def mdd_cache():
+    cached("mdd")
+
+
 def skinned_keys():
     """Shape keys and a skeleton."""
     skinned("LINEAR")
@@ -163,7 +196,7 @@ def skinned_keys():
         key.keyframe_insert("value", frame=frame)
 
 
-for make in (waving, subdivided, skinned_keys):
+for make in (waving, subdivided, skinned_keys, pc2_cache, mdd_cache):
     make()
     path = os.path.join(FOLDER, make.__name__)
     np.save(path + ".npy", evaluated())

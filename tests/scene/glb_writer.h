@@ -86,9 +86,11 @@ class GlbWriter {
                        {"channels", {{{"sampler", 0}, {"target", {{"node", node}, {"path", path}}}}}}});
   }
 
-  std::string bytes() const {
+  /// The file; `more` are buffers after the file's own.
+  std::string bytes(const nlohmann::json& more = nlohmann::json::array()) const {
     nlohmann::json whole = json;
     whole["buffers"] = {{{"byteLength", binary_.size()}}};
+    for (const nlohmann::json& buffer : more) whole["buffers"].push_back(buffer);
     std::string text = whole.dump();
     text.resize((text.size() + 3) / 4 * 4, ' ');
     const auto word = [](std::uint32_t value) { return std::string(reinterpret_cast<const char*>(&value), 4); };

@@ -93,6 +93,10 @@ bool is_index(int type) { return type == kUnsignedByte || type == kUnsignedShort
 
 }  // namespace
 
+std::size_t GltfDocument::components_of(std::size_t index_of_accessor) const {
+  return component_count(text(list("accessors")[index_of_accessor], "type"));
+}
+
 GltfDocument::Accessor GltfDocument::located(const Json& json, std::size_t count, std::size_t element_bytes,
                                              const std::string& what) const {
   Accessor result;
@@ -166,6 +170,10 @@ std::vector<float> GltfDocument::floats(std::size_t index_of_accessor, std::size
   const Accessor from = accessor(index_of_accessor, components);
   if (from.component_type != kFloat && !from.normalised)
     fail(fmt::format("is damaged: accessor {} contains integers instead of floats", index_of_accessor));
+  return quantised_floats(index_of_accessor, components);
+}
+
+std::vector<float> GltfDocument::quantised_floats(std::size_t index_of_accessor, std::size_t components) const {
   std::vector<float> values = unchecked_floats(index_of_accessor, components);
   if (!std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); }))
     fail(fmt::format("accessor {} contains a number that is not finite", index_of_accessor));

@@ -80,6 +80,8 @@ GltfDocument::GltfDocument(const std::filesystem::path& file) : file_(file) {
   }
   content = {};
   load_buffers(std::move(binary));
+  decode_meshopt();
+  decode_draco_meshes();
 }
 
 void GltfDocument::parse(std::span<const std::byte> text) {
@@ -107,7 +109,8 @@ void GltfDocument::load_buffers(std::vector<std::byte> binary) {
       if (!inside.path) fail(fmt::format("its buffer '{}' {}; put it next to the file", uri, inside.reason));
       buffers_.push_back(read_bytes(*inside.path));
     }
-    if (buffers_.back().size() < whole(buffers[i], "byteLength", 0))
+    const bool is_placeholder = uri.empty() && is_fallback(buffers[i]);
+    if (!is_placeholder && buffers_.back().size() < whole(buffers[i], "byteLength", 0))
       fail(fmt::format("buffer {} is cut off: it has {} bytes", i, buffers_.back().size()));
   }
 }
@@ -181,10 +184,14 @@ std::span<const std::byte> GltfDocument::buffer_view(std::size_t index_of_view) 
   const Json& views = list("bufferViews");
   if (index_of_view >= views.size()) fail("is damaged: it refers to a missing bufferView");
   const Json& view = views[index_of_view];
-  const std::vector<std::byte>& buffer = buffers_[index(view, "buffer", "buffers")];
-  const std::size_t offset = whole(view, "byteOffset", 0), length = whole(view, "byteLength", 0);
+  return bytes_of(view, fmt::format("bufferView {}", index_of_view));
+}
+
+std::span<const std::byte> GltfDocument::bytes_of(const Json& json, const std::string& what) const {
+  const std::vector<std::byte>& buffer = buffers_[index(json, "buffer", "buffers")];
+  const std::size_t offset = whole(json, "byteOffset", 0), length = whole(json, "byteLength", 0);
   if (offset > buffer.size() || length > buffer.size() - offset)
-    fail(fmt::format("is damaged: bufferView {} is beyond the end of its buffer", index_of_view));
+    fail(fmt::format("is damaged: {} is beyond the end of its buffer", what));
   return {buffer.data() + offset, length};
 }
 

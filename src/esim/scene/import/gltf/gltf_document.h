@@ -12,7 +12,7 @@
 namespace esim::inline scene {
 
 /// A glTF 2.0 file as text and bytes. The content is not trusted: a value that is missing, of the wrong type or out of
-/// range throws UserError with the file's name.
+/// range throws UserError with the file's name. Data that is compressed by Draco or meshoptimizer is decoded.
 class GltfDocument {
  public:
   using Json = nlohmann::json;
@@ -43,6 +43,9 @@ class GltfDocument {
 
   /// The elements of an accessor of floating-point (or normalised integer) vectors, concatenated, all finite.
   std::vector<float> floats(std::size_t accessor, std::size_t components) const;
+
+  /// As floats(), but integers need not be normalised (KHR_mesh_quantization).
+  std::vector<float> quantised_floats(std::size_t accessor, std::size_t components) const;
 
   /// As floats(), but the numbers need not be finite, and integers need not be normalised.
   std::vector<float> unchecked_floats(std::size_t accessor, std::size_t components) const;
@@ -80,9 +83,21 @@ class GltfDocument {
   void parse(std::span<const std::byte> text);
   void load_buffers(std::vector<std::byte> binary);
 
+  /// The part of a buffer that `json` describes: buffer, byteOffset, byteLength.
+  std::span<const std::byte> bytes_of(const Json& json, const std::string& what) const;
+  std::size_t components_of(std::size_t accessor) const;
+
+  // gltf_compression.cpp
+  static bool is_fallback(const Json& buffer);
+  std::size_t add_buffer(std::vector<std::byte> bytes);
+  void decode_meshopt();
+  void decode_draco_meshes();
+  void decode_primitive(const Json& json, Json& primitive);
+
   std::filesystem::path file_;
   Json root_;
   std::vector<std::vector<std::byte>> buffers_;
+  std::size_t decoded_bytes_ = 0;
 };
 
 }  // namespace esim::inline scene

@@ -49,8 +49,10 @@ class GltfReader {
   void warn(const std::string& text) { graph_.warnings.push_back(text); }
 
   void check_extensions() {
-    static const std::set<std::string> kKnown = {"KHR_materials_unlit", "KHR_materials_emissive_strength",
-                                                 "KHR_texture_transform", "KHR_lights_punctual"};
+    static const std::set<std::string> kKnown = {
+        "KHR_materials_unlit",        "KHR_materials_emissive_strength", "KHR_texture_transform", "KHR_lights_punctual",
+        "KHR_draco_mesh_compression", "EXT_meshopt_compression",         "KHR_mesh_quantization", "EXT_texture_webp",
+        "KHR_texture_basisu"};
     for (const Json& extension : document_.list("extensionsRequired")) {
       const std::string name = extension.is_string() ? extension.get<std::string>() : "?";
       if (!kKnown.contains(name) && !name.starts_with("KHR_materials_"))
@@ -77,13 +79,35 @@ class GltfReader {
     }
   }
 
-  TextureSlot texture_slot(const Json& material, const char* name) {
+  /// The image of a texture; -1 if it has none. A WebP image precedes its fallback. An image in Basis Universal is
+  /// chosen only if it has no fallback; it cannot be decoded.
+  std::int32_t image_of(const Json& texture, const std::string& material) {
+    const Json* const extensions = GltfDocument::find(texture, "extensions");
+    const auto source = [&](const Json* from) {
+      const bool any = from != nullptr && document_.has_index(*from, "source");
+      return any ? static_cast<std::int32_t>(document_.index(*from, "source", "images")) : -1;
+    };
+    const auto extension = [&](const char* name) {
+      return source(extensions != nullptr ? GltfDocument::find(*extensions, name) : nullptr);
+    };
+    if (const std::int32_t webp = extension("EXT_texture_webp"); webp >= 0) return webp;
+    if (const std::int32_t plain = source(&texture); plain >= 0) return plain;
+    const std::int32_t basis = extension("KHR_texture_basisu");
+    if (basis >= 0)
+      warn(fmt::format(
+          "material {}: its texture is in Basis Universal (KTX2), which is not supported: convert it to PNG, "
+          "JPEG or WebP",
+          material));
+    return basis;
+  }
+
+  /// The texture `name` of a part of a material.
+  TextureSlot texture_slot(const Json& part, const char* name, const std::string& material) {
     TextureSlot slot;
-    const Json* const info = GltfDocument::find(material, name);
+    const Json* const info = GltfDocument::find(part, name);
     if (info == nullptr) return slot;
     const Json& texture = document_.list("textures")[document_.index(*info, "index", "textures")];
-    if (document_.has_index(texture, "source"))
-      slot.texture.image = static_cast<std::int32_t>(document_.index(texture, "source", "images"));
+    slot.texture.image = image_of(texture, material);
     if (document_.has_index(texture, "sampler")) {
       constexpr double kClamp = 33071;
       const Json& sampler = document_.list("samplers")[document_.index(texture, "sampler", "samplers")];
@@ -165,7 +189,7 @@ class GltfReader {
       TextureSlot base;
       if (const Json* const pbr = GltfDocument::find(json, "pbrMetallicRoughness")) {
         material.base = colour_of(document_.numbers(*pbr, "baseColorFactor", {1, 1, 1, 1}));
-        base = texture_slot(*pbr, "baseColorTexture");
+        base = texture_slot(*pbr, "baseColorTexture", material.name);
         material.base_texture = base.texture;
       }
       material.unlit = extension("KHR_materials_unlit") != nullptr;
@@ -176,7 +200,7 @@ class GltfReader {
       material.emission = colour_of(document_.numbers(json, "emissiveFactor", {0, 0, 0}));
       if (const Json* const strength = extension("KHR_materials_emissive_strength"))
         material.emission *= static_cast<float>(document_.number(*strength, "emissiveStrength", 1));
-      const TextureSlot emission = texture_slot(json, "emissiveTexture");
+      const TextureSlot emission = texture_slot(json, "emissiveTexture", material.name);
       if (emission.texture.image >= 0) material.emission_texture = emission.texture;
       share_coordinates("emission", emission, material.name, base);
       read_gloss(json, extensions, material, base);
@@ -229,7 +253,7 @@ class GltfReader {
   void append(Mesh& mesh, GraphShape& shape, const Json& primitive, const std::string& name) {
     const Json* const attributes = GltfDocument::find(primitive, "attributes");
     if (attributes == nullptr || GltfDocument::find(*attributes, "POSITION") == nullptr) return;
-    const auto positions = document_.floats(accessor_of(*attributes, "POSITION"), 3);
+    const auto positions = document_.quantised_floats(accessor_of(*attributes, "POSITION"), 3);
     const std::size_t vertices = positions.size() / 3, first = mesh.vertices.size();
     const auto indices = corners(primitive, vertices);
     vertex_count_ += vertices, triangle_count_ += indices.size() / 3;
@@ -245,7 +269,7 @@ class GltfReader {
     for (std::size_t i = 0; i < vertices; ++i)
       mesh.vertices.emplace_back(positions[3 * i], positions[3 * i + 1], positions[3 * i + 2]);
     if (GltfDocument::find(*attributes, "NORMAL") != nullptr) {
-      const auto normals = document_.floats(accessor_of(*attributes, "NORMAL"), 3);
+      const auto normals = document_.quantised_floats(accessor_of(*attributes, "NORMAL"), 3);
       if (normals.size() != positions.size()) document_.fail("is damaged: a mesh must have one normal per vertex");
       mesh.normals.resize(first, Eigen::Vector3f::Zero());
       for (std::size_t i = 0; i < vertices; ++i)
@@ -255,7 +279,7 @@ class GltfReader {
     }
     std::vector<Eigen::Vector2f> uv(vertices, Eigen::Vector2f::Zero());
     if (GltfDocument::find(*attributes, slot.coordinates.c_str()) != nullptr) {
-      const auto coordinates = document_.floats(accessor_of(*attributes, slot.coordinates.c_str()), 2);
+      const auto coordinates = document_.quantised_floats(accessor_of(*attributes, slot.coordinates.c_str()), 2);
       if (coordinates.size() != 2 * vertices)
         document_.fail("is damaged: a mesh must have one pair of texture coordinates per vertex");
       for (std::size_t i = 0; i < vertices; ++i)

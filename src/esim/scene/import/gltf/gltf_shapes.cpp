@@ -99,7 +99,7 @@ MorphTarget GltfShapes::target(const Json& json, const Range& range) const {
   const auto offsets = [&](const char* attribute) {
     std::vector<float> values;
     if (GltfDocument::find(json, attribute) == nullptr) return values;
-    values = document_.floats(document_.index(json, attribute, "accessors"), 3);
+    values = document_.quantised_floats(document_.index(json, attribute, "accessors"), 3);
     if (values.size() != 3 * range.count)
       document_.fail(fmt::format("is damaged: a morph target has {} offsets for a primitive of {} vertices",
                                  values.size() / 3, range.count));

@@ -18,13 +18,10 @@ import walker_body as body  # noqa: E402
 import walker_motion as motion  # noqa: E402
 import walker_paint as paint  # noqa: E402
 from glb import Glb  # noqa: E402
+from skin import turns  # noqa: E402
 from surface import of_field, turned  # noqa: E402
 
 VASE = (0.30, -1.78)  # its place on the floor
-
-
-def turns(x, y):
-    return np.arctan2(y, x) / (2 * np.pi) + 0.5
 
 
 def everywhere(p):

@@ -5,6 +5,7 @@ It stands with straight legs on z = 0, and its arms hang 22 degrees away from it
 import numpy as np
 
 from fields import below, box, cone, displaced, ellipsoid, grown, intersection, sphere, torus, union, without
+from skin import chain, ramp
 
 ARM = np.radians(22)                                 # from the vertical, in the rest pose
 FOREARM = np.radians(12)                             # forward, likewise
@@ -28,11 +29,6 @@ for _side, _m in (("left", 1), ("right", RIGHT)):
                (f"{_side} thigh", 0, HIP * _m), (f"{_side} shin", _n + 4, KNEE * _m),
                (f"{_side} foot", _n + 5, ANKLE * _m), (f"{_side} toes", _n + 6, TOE * _m)]
 NUMBER = {name: k for k, (name, _, _) in enumerate(JOINTS)}
-
-
-def ramp(low, high, x):
-    t = np.clip((x - low) / (high - low), 0, 1)
-    return t * t * (3 - 2 * t)
 
 
 def both(field):
@@ -141,16 +137,6 @@ def hands():
 
 
 # ------------------------------------------------------------------ weights
-def chain(points, *parts):
-    """Weights of joints of which each takes its fraction from the one before: parts are (joint, fraction (points))."""
-    w = np.zeros((len(points), len(JOINTS)))
-    w[:, NUMBER[parts[0][0]]] = 1
-    for name, fraction in parts[1:]:
-        w *= 1 - fraction[:, None]
-        w[:, NUMBER[name]] += fraction
-    return w
-
-
 def sided(points, one_side):
     """Weights of both sides, from a function of mirrored points and a side, for parts that are apart."""
     mirrored = points * np.array([1, 1, 1]) * np.where(points[:, 1:2] < 0, RIGHT, 1)
@@ -180,7 +166,7 @@ def trousers_weights(p):
 def sweater_weights(p):
     left, right = hips_and_legs(p)
     above = ramp(-0.08, 0.08, p[:, 2] - 1.07)
-    w = chain(p, ("pelvis", None), ("spine", above), ("chest", ramp(-0.09, 0.09, p[:, 2] - 1.22)))
+    w = chain(p, NUMBER, ("pelvis", None), ("spine", above), ("chest", ramp(-0.09, 0.09, p[:, 2] - 1.22)))
     for name, part in (("left", left), ("right", right)):
         part = part * (1 - above)
         w *= (1 - part)[:, None]
@@ -203,16 +189,16 @@ def sweater_weights(p):
 
 def head_weights(p):
     neck = ramp(-0.035, 0.035, p[:, 2] - 1.475)
-    return chain(p, ("chest", None), ("neck", neck), ("head", ramp(-0.035, 0.03, p[:, 2] - 1.555 + 0.75 * np.maximum(p[:, 0] - 0.02, 0))))
+    return chain(p, NUMBER, ("chest", None), ("neck", neck), ("head", ramp(-0.035, 0.03, p[:, 2] - 1.555 + 0.75 * np.maximum(p[:, 0] - 0.02, 0))))
 
 
 def hair_weights(p):
-    return chain(p, ("head", None))
+    return chain(p, NUMBER, ("head", None))
 
 
 def hands_weights(p):
-    return sided(p, lambda q, side: chain(q, (f"{side} forearm", None), (f"{side} hand", ramp(-0.022, 0.022, (q - WRIST) @ LOWER))))
+    return sided(p, lambda q, side: chain(q, NUMBER, (f"{side} forearm", None), (f"{side} hand", ramp(-0.022, 0.022, (q - WRIST) @ LOWER))))
 
 
 def shoes_weights(p):
-    return sided(p, lambda q, side: chain(q, (f"{side} foot", None), (f"{side} toes", ramp(-0.04, 0.0, q[:, 0] - TOE[0]))))
+    return sided(p, lambda q, side: chain(q, NUMBER, (f"{side} foot", None), (f"{side} toes", ramp(-0.04, 0.0, q[:, 0] - TOE[0]))))

@@ -20,13 +20,31 @@ class GlbWriter {
 
   std::size_t floats(const std::vector<float>& values, const std::string& type) {
     static const std::map<std::string, std::size_t> kComponents = {
-        {"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}};
+        {"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT4", 16}};
     const std::size_t view = add_view(values.data(), values.size() * sizeof(float));
     return add_accessor(view, 5126, values.size() / kComponents.at(type), type);
   }
 
   std::size_t indices(const std::vector<std::uint16_t>& values) {
     return add_accessor(add_view(values.data(), values.size() * sizeof(std::uint16_t)), 5123, values.size(), "SCALAR");
+  }
+
+  /// Indices of joints, four per vertex.
+  std::size_t joints(const std::vector<std::uint8_t>& values) {
+    return add_accessor(add_view(values.data(), values.size()), 5121, values.size() / 4, "VEC4");
+  }
+
+  /// Vectors of which only some differ from zero.
+  std::size_t sparse(std::size_t count, const std::vector<std::uint16_t>& places, const std::vector<float>& values) {
+    const std::size_t indices = add_view(places.data(), places.size() * sizeof(std::uint16_t));
+    const std::size_t replaced = add_view(values.data(), values.size() * sizeof(float));
+    return add("accessors", {{"componentType", 5126},
+                             {"count", count},
+                             {"type", "VEC3"},
+                             {"sparse",
+                              {{"count", places.size()},
+                               {"indices", {{"bufferView", indices}, {"componentType", 5123}}},
+                               {"values", {{"bufferView", replaced}}}}}});
   }
 
   std::size_t add_view(const void* data, std::size_t size) {
@@ -60,7 +78,9 @@ class GlbWriter {
 
   void animate(std::size_t node, const char* path, const std::vector<float>& times, const std::vector<float>& values,
                const char* interpolation = "LINEAR") {
-    const char* const type = std::string(path) == "rotation" ? "VEC4" : "VEC3";
+    const char* const type = std::string(path) == "rotation"  ? "VEC4"
+                             : std::string(path) == "weights" ? "SCALAR"
+                                                              : "VEC3";
     const auto input = floats(times, "SCALAR"), output = floats(values, type);
     add("animations", {{"samplers", {{{"input", input}, {"output", output}, {"interpolation", interpolation}}}},
                        {"channels", {{{"sampler", 0}, {"target", {{"node", node}, {"path", path}}}}}}});

@@ -95,5 +95,5 @@ def esim_open(path):
 def esim_export(path):
     bpy.ops.export_scene.gltf(
         filepath=path, export_format="GLB", export_yup=True, export_apply=True, export_cameras=True,
-        export_extras=True, export_animations=True, export_force_sampling=True, export_morph=False,
-        export_nla_strips=False, export_skins=False)
+        export_extras=True, export_animations=True, export_force_sampling=True, export_nla_strips=False,
+        export_skins=True, export_all_influences=True, export_morph=True)

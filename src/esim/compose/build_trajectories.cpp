@@ -237,8 +237,13 @@ std::vector<std::shared_ptr<const Trajectory>> build_object_trajectories(const S
   std::size_t animated = 0;
   for (const SceneObject& object : scene.scene.objects) {
     if (!object.moves || animated == scene.motions.size()) continue;
-    auto animation =
-        fit_animation(scene.motions[animated++], body.start(), time_scale, "object " + object.name, notices);
+    const SceneMotion& motion = scene.motions[animated++];
+    if (motion.size() == 1) {
+      trajectories.push_back(
+          std::make_shared<const StaticTrajectory>(motion.front().T_world_object, span.start, span.end - span.start));
+      continue;
+    }
+    auto animation = fit_animation(motion, body.start(), time_scale, "object " + object.name, notices);
     if (animation->end() < simulated.end)
       animation = std::make_shared<const RestingTrajectory>(std::move(animation), simulated.end);
     trajectories.push_back(std::move(animation));

@@ -386,9 +386,10 @@ World build_world(const Scenario& scenario, int threads, const Notices& notices,
 
 World build_world(const Scenario& scenario, const Substitutes& substitutes, int threads, const Notices& notices,
                   const std::shared_ptr<ImageCache>& cache) {
-  const SceneFile scene = substitutes.make_renderer ? SceneFile{} : load_scenes(scenario, look_of(scenario), notices);
+  SceneFile scene = substitutes.make_renderer ? SceneFile{} : load_scenes(scenario, look_of(scenario), notices);
   std::shared_ptr<const Trajectory> body =
       substitutes.body != nullptr ? substitutes.body : build_trajectory(scenario, scene, notices);
+  play_deformations(scenario, body->start(), scene);
   const TimeSpan span = simulated_span(scenario, *body);
   return build(scenario, scene, std::move(body), span, substitutes, threads, notices, cache);
 }
@@ -400,6 +401,7 @@ struct LoadedScene {
 
 std::shared_ptr<const LoadedScene> load_scene(const Scenario& scenario, const Notices& notices) {
   SceneFile scene = load_scenes(scenario, look_of(scenario), notices);
+  play_deformations(scenario, 0, scene);
   std::vector<CameraInfo> cameras;
   for (const CameraOptions& options : scenario.cameras)
     cameras.push_back(camera_info(options, followed_camera(scenario, scene)));
@@ -415,6 +417,8 @@ std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, con
 World build_world(const Scenario& scenario, const LoadedScene& loaded, std::shared_ptr<const Trajectory> body,
                   int threads, const Notices& notices) {
   if (!scenario.duration_s) throw UserError("duration_s: is missing; an online motion does not define one");
+  if (body->start() != 0 && std::ranges::any_of(loaded.scene.scene.objects, &SceneObject::deforms))
+    throw UserError("an online motion must start at 0 s if the scene deforms");
   const TimeNs start = body->start() + to_ns(scenario.start_s);
   const TimeSpan span{start, start + to_ns(*scenario.duration_s)};
   return build(scenario, loaded.scene, std::move(body), span, Substitutes{}, threads, notices, nullptr,

@@ -106,6 +106,10 @@ CameraInfo camera_info(CameraOptions options, const SceneCamera* followed);
 /// Empty for renderers without scene files. Notes describe the contents.
 SceneFile load_scenes(const Scenario& scenario, SceneLook look, const Notices& notices);
 
+/// Sets when the deformations of a loaded scene are played: in the time of the simulation instead of the file's, from
+/// the start of the body's trajectory on, as its other animations (see build_object_trajectories).
+void play_deformations(const Scenario& scenario, TimeNs body_start, SceneFile& file);
+
 /// The motion of the body that a scenario describes.
 std::shared_ptr<const Trajectory> build_trajectory(const Scenario& scenario, const SceneFile& scene,
                                                    const Notices& notices);

@@ -1,9 +1,13 @@
 #include <fmt/format.h>
 
+#include <map>
+#include <utility>
+
 #include "esim/blender/blender.h"
 #include "esim/compose/compose.h"
 #include "esim/core/error.h"
 #include "esim/geometry/upright.h"
+#include "esim/scene/deformation/adapted.h"
 #include "esim/scene/splats/splat_file.h"
 
 namespace esim::inline compose {
@@ -68,25 +72,52 @@ Splats upright_splats(const SplatsRendererOptions& options, const Notices& notic
   return splats;
 }
 
-/// Loads an object: a mesh, or splats for a renderer with these.
-SceneObject load_object(const ObjectOptions& options, const SplatsRendererOptions* with_splats, SceneLook look,
-                        const Notices& notices) {
-  SceneObject object{options.name, {}, true};
-  if (with_splats != nullptr && is_splat_file(options.scene)) {
-    object.splats = std::make_shared<const Splats>(splats_of(options.scene, options.scale, *with_splats, notices));
+/// Loads the objects that a scenario lists. Those of the same file and scale share its textures and deformation.
+class ObjectLoader {
+ public:
+  ObjectLoader(const SplatsRendererOptions* with_splats, SceneLook look, const Notices& notices)
+      : with_splats_(with_splats), look_(look), notices_(notices) {}
+
+  /// An object: a mesh, or splats for a renderer with these.
+  SceneObject load(const ObjectOptions& options) {
+    const auto [known, is_new] = loaded_.try_emplace({options.scene, options.scale});
+    if (is_new) known->second = read(options);
+    SceneObject object = known->second;
+    object.name = options.name;
     return object;
   }
-  object.mesh = load_mesh(readable(options.scene, notices), notices.warning, look);
-  for (Eigen::Vector3f& vertex : object.mesh.vertices) vertex *= static_cast<float>(options.scale);
-  return object;
-}
+
+ private:
+  SceneObject read(const ObjectOptions& options) const {
+    SceneObject object{{}, {}, true};
+    if (with_splats_ != nullptr && is_splat_file(options.scene)) {
+      object.splats = std::make_shared<const Splats>(splats_of(options.scene, options.scale, *with_splats_, notices_));
+      return object;
+    }
+    object = load_scene_object(readable(options.scene, notices_), notices_.warning, look_);
+    object.moves = true;
+    for (Eigen::Vector3f& vertex : object.mesh.vertices) vertex *= static_cast<float>(options.scale);
+    if (object.deformation == nullptr) return object;
+    const TimeSpan span = object.deformation->span();
+    notices_.note(fmt::format("scene {}: deforms; animation from {:.3f} to {:.3f} s", options.scene.filename().string(),
+                              to_seconds(span.start), to_seconds(span.end)));
+    if (options.scale != 1) object.deformation = scaled(std::move(object.deformation), options.scale);
+    return object;
+  }
+
+  const SplatsRendererOptions* with_splats_;
+  SceneLook look_;
+  const Notices& notices_;
+  std::map<std::pair<std::filesystem::path, double>, SceneObject> loaded_;
+};
 
 /// Adds the objects that a scenario lists.
 void add_objects(const std::vector<ObjectOptions>& objects, const LightingOptions& lighting,
                  const SplatsRendererOptions* with_splats, SceneLook look, const Notices& notices, SceneFile& file) {
+  ObjectLoader loader(with_splats, look, notices);
   for (std::size_t i = 0; i < objects.size(); ++i) {
     require_scene_path(objects[i].scene, fmt::format("objects.{}.scene", i));
-    SceneObject loaded = load_object(objects[i], with_splats, look, notices);
+    SceneObject loaded = loader.load(objects[i]);
     if (loaded.name.empty()) loaded.name = fmt::format("object{}", i);
     for (const SceneObject& other : file.scene.objects) {
       if (!other.moves || other.name != loaded.name) continue;
@@ -147,6 +178,24 @@ SceneFile load_scenes(const Scenario& scenario, SceneLook look, const Notices& n
   if (blender != nullptr && std::holds_alternative<SceneTrajectoryOptions>(scenario.trajectory))
     return load_cameras(*blender, notices);
   return std::visit([&](const auto& renderer) { return load(renderer, look, notices); }, scenario.renderer);
+}
+
+void play_deformations(const Scenario& scenario, TimeNs body_start, SceneFile& file) {
+  const auto* const listed = listed_objects(scenario.renderer);
+  if (listed == nullptr) return;
+  const auto* const mesh = std::get_if<MeshRendererOptions>(&scenario.renderer);
+  std::size_t index = 0;  // of the moving object
+  for (SceneObject& object : file.scene.objects) {
+    if (!object.moves) continue;
+    const std::size_t i = index++;
+    if (object.deformation == nullptr) continue;
+    AnimationClock clock{body_start, mesh != nullptr ? mesh->time_scale : 1};
+    if (i >= file.motions.size()) {
+      const AnimationOptions& options = (*listed)[i - file.motions.size()].animation;
+      clock = {body_start, options.time_scale, to_ns(options.offset_s), options.repeat};
+    }
+    object.deformation = retimed(std::move(object.deformation), clock);
+  }
 }
 
 }  // namespace esim::inline compose

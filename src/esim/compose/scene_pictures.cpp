@@ -42,6 +42,7 @@ ScenePictures::ScenePictures(const Scenario& scenario, int threads, const Notice
     try {
       colour_ = colour;
       scene_ = load_scenes(scenario, colour ? SceneLook::colour : SceneLook::luminance, notices);
+      play_deformations(scenario, 0, scene_);
       factory_ =
           build_renderer_factory(scenario.renderer, scene_, colour,
                                  {{options.name, camera, pose_named("T_body_camera", options.T_body_camera)}}, notices);

@@ -17,9 +17,10 @@ class ScenePictures {
   const SceneFile& scene() const { return scene_; }
   const RendererTraits& traits() const { return traits_; }
 
-  /// Renders the image of a camera at the poses and the time of `view`, whose tiles are ignored. Each pixel is the mean
-  /// of finer x finer smaller ones; `finer` must be even in colour, so that each pixel covers all colour filters. Keeps
-  /// the renderer for the next image of the same size. Call from one thread at a time.
+  /// Renders the image of a camera at the poses and the time of `view`, whose tiles are ignored. Scenes deform from
+  /// time 0 on, so that its time must count from the start of the body's trajectory if the scene deforms. Each pixel is
+  /// the mean of finer x finer smaller ones; `finer` must be even in colour, so that each pixel covers all colour
+  /// filters. Keeps the renderer for the next image of the same size. Call from one thread at a time.
   Image<Rgb> render(const Camera& camera, int finer, RenderRequest view);
 
  private:

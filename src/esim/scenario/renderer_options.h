@@ -19,12 +19,27 @@
 /// a function in compose/renderer_factory.cpp.
 namespace esim::inline scenario {
 
+/// How the animation of an object's scene file is played.
+struct AnimationOptions {
+  double time_scale = 1.0;
+  double offset_s = 0.0;
+  bool repeat = false;
+};
+
+template <class Visitor>
+void describe(Visitor& visit, AnimationOptions& o) {
+  visit("time_scale", o.time_scale, About{"factor on its duration: 2 takes twice as long", "", 0, 1e6, true});
+  visit("offset_s", o.offset_s, About{"time of the animation at which it begins, after its start", "s", 0, 1e6});
+  visit("repeat", o.repeat, About{"whether it begins again after its end, instead of resting"});
+}
+
 /// A moving object of the scene.
 struct ObjectOptions {
   std::string name;
   std::filesystem::path scene;
   double scale = 1.0;
   TrajectoryOptions trajectory;
+  AnimationOptions animation{};
   std::optional<FlickerOptions> flicker{};  ///< unset: lit by the light of the scene
 };
 
@@ -34,6 +49,8 @@ void describe(Visitor& visit, ObjectOptions& o) {
   visit("scene", o.scene, About{"scene file, in the coordinates of the object"});
   visit("scale", o.scale, About{"factor that converts its coordinates to metres", "", 0, 1e6, true});
   visit("trajectory", o.trajectory, About{"motion: pose of the object's coordinates in the world"});
+  visit("animation", o.animation,
+        About{"how the animations of the scene file are played; they begin with the body's trajectory"});
   visit("flicker", o.flicker, About{"makes the object a light of its own, such as a screen or a lamp, that flickers"});
 }
 

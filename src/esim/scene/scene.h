@@ -23,6 +23,8 @@ struct SceneObject {
 
   /// If set, the mesh deforms, and `mesh` is its shape at the start. Such an object `moves`, even if its pose rests.
   std::shared_ptr<const Deformation> deformation{};
+
+  bool deforms() const { return deformation != nullptr; }
 };
 
 /// A scene for renderers of triangles.

@@ -36,7 +36,11 @@ SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandle
 }
 
 Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look) {
-  return flatten_still(read_graph(path), path, warn, look);
+  return flatten_joined(read_graph(path), path, warn, look, false).mesh;
+}
+
+SceneObject load_scene_object(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look) {
+  return flatten_joined(read_graph(path), path, warn, look, true);
 }
 
 std::string summary(const SceneFile& file) {
@@ -51,7 +55,7 @@ std::string summary(const SceneFile& file) {
 
   std::string names;
   for (const SceneObject& object : file.scene.objects) {
-    if (object.moves) names += (names.empty() ? "" : ", ") + object.name;
+    if (object.moves) names += (names.empty() ? "" : ", ") + object.name + (object.deformation ? " (deforms)" : "");
   }
   text += names.empty() ? "; no moving objects"
                         : fmt::format("; moving {}: {}", counted(file.motions.size(), "object", "objects"), names);

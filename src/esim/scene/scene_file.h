@@ -29,7 +29,7 @@ struct SceneCamera {
 
 /// The content of a scene file. The world's z axis points up; docs/scenes.md has each format's frame and units.
 struct SceneFile {
-  Scene scene;                       ///< first the static part, if there is one; then each animated subtree
+  Scene scene;                       ///< first the static part, if there is one; then what moves or deforms
   std::vector<SceneMotion> motions;  ///< of the scene's moving objects, in their order
   std::vector<SceneCamera> cameras;
   TimeSpan animation;           ///< of the file; empty if nothing moves
@@ -41,6 +41,10 @@ struct SceneFile {
 /// grey. Throws UserError, naming the file, if it cannot be read, is damaged, or has no triangles.
 SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandler& warn,
                           SceneLook look = SceneLook::luminance);
+
+/// Loads a scene file as one object in the file's coordinates, with the name of the file. If anything in it is
+/// animated, the object deforms: all animations are played. Throws as load_scene_file().
+SceneObject load_scene_object(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look);
 
 /// A summary in one line: objects, triangles, materials, textures, cameras, animation.
 std::string summary(const SceneFile& file);

@@ -174,7 +174,10 @@ class Converter {
       mesh.material.push_back(has_material ? part.mMaterialIndex : 0);
     }
     if (part.HasVertexColors(0)) warn(fmt::format("mesh {}: vertex colours are not supported, and are ignored", name));
-    if (part.HasBones()) warn(fmt::format("mesh {}: skeletons are not supported; it is shown in its rest pose", name));
+    if (part.HasBones())
+      warn(fmt::format("mesh {}: skeletons are only read from glTF; it is shown in its rest pose", name));
+    if (part.mNumAnimMeshes > 0)
+      warn(fmt::format("mesh {}: shape keys are only read from glTF, and are ignored", name));
     return mesh;
   }
 

@@ -4,7 +4,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <set>
 
+#include "esim/scene/import/deforming_mesh.h"
 #include "esim/scene/import/motion_samples.h"
 #include "esim/scene/import/texture_store.h"
 
@@ -146,69 +149,161 @@ void give_warnings(const SceneGraph& graph, const std::filesystem::path& file, c
                      file.filename().string(), graph.normal_maps));
 }
 
+/// All parts of a graph.
+std::vector<GraphPart> parts_of(const SceneGraph& graph) {
+  std::vector<GraphPart> parts;
+  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
+    for (const std::uint32_t mesh : graph.nodes[i].meshes) parts.push_back({i, mesh});
+  }
+  return parts;
+}
+
+/// Splits a graph into objects.
+class Flattener {
+ public:
+  Flattener(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn, SceneLook look)
+      : graph_(graph),
+        file_(file),
+        transforms_(graph, file),
+        textures_(graph, file.parent_path(), warn, look),
+        materials_(convert_materials(graph, textures_)) {}
+
+  SceneFile objects(const WarningHandler& warn) {
+    result_.animation = transforms_.span();
+    result_.image_count = textures_.image_count();
+    const std::vector<int> mover_of = movers(graph_, transforms_);
+    std::map<int, std::vector<GraphPart>> parts;  // of each mover
+    for (const GraphPart& part : parts_of(graph_))
+      parts[is_skinned(graph_, part) ? kWorld : mover_of[part.node]].push_back(part);
+    for (const auto& [mover, of_mover] : parts) add_mover(mover, of_mover);
+    add_cameras(warn);
+    return std::move(result_);
+  }
+
+  /// Everything as one object.
+  SceneObject joined(const std::string& name, bool plays) {
+    const std::vector<GraphPart> parts = parts_of(graph_);
+    const bool moves = std::any_of(parts.begin(), parts.end(), [&](const GraphPart& part) {
+      return deforms(graph_, transforms_, part) || (!is_skinned(graph_, part) && transforms_.moves(part.node));
+    });
+    SceneObject object{name, {}};
+    if (plays && moves) {
+      DeformingMesh mesh(graph_, transforms_, file_);
+      for (const GraphPart& part : parts) mesh.append(part);
+      object.mesh = mesh.take(object.deformation);
+      add_materials(object.mesh);
+      return object;
+    }
+    MeshJoiner joiner(file_);
+    for (const GraphPart& part : parts) append_rest(part, Eigen::Matrix4d::Identity(), joiner);
+    object.mesh = joiner.take(materials_);
+    return object;
+  }
+
+ private:
+  void append_rest(const GraphPart& part, const Eigen::Matrix4d& T_object_world, MeshJoiner& joiner) const {
+    const Eigen::Matrix4d T_world_part = is_skinned(graph_, part) ? Eigen::Matrix4d(Eigen::Matrix4d::Identity())
+                                                                  : transforms_.world(part.node, transforms_.start_s());
+    joiner.append(shaped_at_start(graph_, transforms_, file_, part), T_object_world * T_world_part);
+  }
+
+  void add_materials(Mesh& mesh) const {
+    mesh.materials = materials_.luminance;
+    mesh.coloured = materials_.coloured;
+  }
+
+  void add(const std::string& name, Mesh mesh, const SceneMotion& motion,
+           std::shared_ptr<const Deformation> deformation) {
+    SceneObject object{unique_name(name), std::move(mesh), true};
+    object.deformation = std::move(deformation);
+    result_.scene.objects.push_back(std::move(object));
+    result_.motions.push_back(motion);
+  }
+
+  std::string unique_name(const std::string& name) {
+    std::string unique = name;
+    for (int i = 2; !names_.insert(unique).second; ++i) unique = fmt::format("{} ({})", name, i);
+    return unique;
+  }
+
+  /// Adds the parts that a mover, or nothing, moves. Those that deform become objects of their own.
+  void add_mover(int mover, const std::vector<GraphPart>& parts) {
+    const SceneMotion at_rest = {{result_.animation.start, {}}};
+    const bool moves = mover != kWorld;
+    SampledMotion sampled{at_rest};
+    std::string name = "world";
+    if (moves) {
+      sampled = sample_motion(transforms_, static_cast<std::size_t>(mover), Eigen::Matrix4d::Identity());
+      name = graph_.nodes[static_cast<std::size_t>(mover)].name;
+    }
+    const SceneMotion& motion = sampled.rigid ? sampled.motion : at_rest;
+    const Eigen::Matrix4d T_object_world = motion.front().T_world_object.inverse().matrix();
+
+    MeshJoiner rigid(file_);
+    DeformingMesh scaled(graph_, transforms_, file_);
+    for (const GraphPart& part : parts) {
+      if (deforms(graph_, transforms_, part)) continue;
+      if (sampled.rigid) {
+        append_rest(part, T_object_world, rigid);
+      } else {
+        scaled.append(part);
+      }
+    }
+    if (!rigid.empty() && moves) add(name, rigid.take(materials_), motion, nullptr);
+    if (!rigid.empty() && !moves) result_.scene.objects.push_back({name, rigid.take(materials_)});
+    if (!scaled.empty()) add_deforming(name, scaled, motion);
+    for (const GraphPart& part : parts) {
+      if (!deforms(graph_, transforms_, part)) continue;
+      DeformingMesh mesh(graph_, transforms_, file_);
+      if (sampled.rigid && moves) {
+        mesh.append_at(part, T_object_world * transforms_.world(part.node, transforms_.start_s()));
+      } else {
+        mesh.append(part);
+      }
+      if (!mesh.empty()) add_deforming(graph_.nodes[part.node].name, mesh, motion);
+    }
+  }
+
+  void add_deforming(const std::string& name, DeformingMesh& deforming, const SceneMotion& motion) {
+    std::shared_ptr<const Deformation> deformation;
+    Mesh mesh = deforming.take(deformation);
+    add_materials(mesh);
+    add(name, std::move(mesh), motion, std::move(deformation));
+  }
+
+  void add_cameras(const WarningHandler& warn) {
+    for (const GraphCamera& camera : graph_.cameras) {
+      SampledMotion sampled = sample_motion(transforms_, camera.node, camera.T_node_camera);
+      if (!sampled.rigid) warn(fmt::format("camera {}: its animated scale has no effect", camera.name));
+      SceneCamera converted{camera.name, {}, std::move(sampled.motion)};
+      if (camera.horizontal_fov_rad > 0) converted.horizontal_fov_rad = camera.horizontal_fov_rad;
+      result_.cameras.push_back(std::move(converted));
+    }
+  }
+
+  const SceneGraph& graph_;
+  const std::filesystem::path& file_;
+  NodeTransforms transforms_;
+  TextureStore textures_;
+  Materials materials_;
+  SceneFile result_;
+  std::set<std::string> names_;
+};
+
 }  // namespace
 
 SceneFile flatten(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
                   SceneLook look) {
   check_size(graph, file);
   give_warnings(graph, file, warn);
-  SceneFile result;
-  const NodeTransforms transforms(graph, file);
-  result.animation = transforms.span();
-  const double start_s = transforms.start_s();
-  TextureStore textures(graph, file.parent_path(), warn, look);
-  const Materials materials = convert_materials(graph, textures);
-  result.image_count = textures.image_count();
-
-  // The geometry of each mover, in the order of the nodes.
-  const std::vector<int> mover_of = movers(graph, transforms);
-  std::vector<int> objects = {kWorld};
-  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-    if (mover_of[i] == static_cast<int>(i)) objects.push_back(static_cast<int>(i));
-  }
-  for (const int object : objects) {
-    const bool moves = object != kWorld;
-    SceneMotion motion;
-    Eigen::Matrix4d T_object_world = Eigen::Matrix4d::Identity();
-    if (moves) {
-      const auto node = static_cast<std::size_t>(object);
-      motion = sample_motion(transforms, node, Eigen::Matrix4d::Identity(), graph.nodes[node].name, warn);
-      T_object_world = motion.front().T_world_object.inverse().matrix();
-    }
-    MeshJoiner joiner(file);
-    for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-      if (mover_of[i] != object) continue;
-      for (const std::uint32_t mesh : graph.nodes[i].meshes)
-        joiner.append(graph.meshes[mesh], T_object_world * transforms.world(i, start_s));
-    }
-    if (joiner.empty()) continue;
-    Mesh mesh = joiner.take(materials);
-    const std::string name = moves ? graph.nodes[static_cast<std::size_t>(object)].name : "world";
-    result.scene.objects.push_back({name, std::move(mesh), moves});
-    if (moves) result.motions.push_back(std::move(motion));
-  }
-
-  for (const GraphCamera& camera : graph.cameras) {
-    SceneCamera converted{
-        camera.name, {}, sample_motion(transforms, camera.node, camera.T_node_camera, camera.name, warn)};
-    if (camera.horizontal_fov_rad > 0) converted.horizontal_fov_rad = camera.horizontal_fov_rad;
-    result.cameras.push_back(std::move(converted));
-  }
-  return result;
+  return Flattener(graph, file, warn, look).objects(warn);
 }
 
-Mesh flatten_still(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
-                   SceneLook look) {
+SceneObject flatten_joined(const SceneGraph& graph, const std::filesystem::path& file, const WarningHandler& warn,
+                           SceneLook look, bool plays) {
   check_size(graph, file);
   give_warnings(graph, file, warn);
-  const NodeTransforms transforms(graph, file);
-  TextureStore textures(graph, file.parent_path(), warn, look);
-  MeshJoiner joiner(file);
-  for (std::size_t i = 0; i < graph.nodes.size(); ++i) {
-    for (const std::uint32_t mesh : graph.nodes[i].meshes)
-      joiner.append(graph.meshes[mesh], transforms.world(i, transforms.start_s()));
-  }
-  return joiner.take(convert_materials(graph, textures));
+  return Flattener(graph, file, warn, look).joined(file.stem().string(), plays);
 }
 
 }  // namespace esim::inline scene

@@ -23,6 +23,12 @@ std::array<const Track*, 3> tracks_of(const GraphNode& node) {
   return {&node.translation_track, &node.rotation_track, &node.scale_track};
 }
 
+/// The number of morph targets of the node's meshes.
+std::size_t target_count(const SceneGraph& graph, const GraphNode& node) {
+  const bool any = !node.meshes.empty() && node.meshes.front() < graph.shapes.size();
+  return any ? graph.shapes[node.meshes.front()].targets.size() : 0;
+}
+
 Eigen::Matrix3d nearest_rotation(const Eigen::Matrix3d& A) {
   const Eigen::JacobiSVD<Eigen::Matrix3d> svd(A, Eigen::ComputeFullU | Eigen::ComputeFullV);
   Eigen::Matrix3d sign = Eigen::Matrix3d::Identity();
@@ -80,23 +86,35 @@ std::vector<double> dense_times(double start_s, double end_s) {
 
 NodeTransforms::NodeTransforms(const SceneGraph& graph, const std::filesystem::path& file) : graph_(graph) {
   std::vector<std::size_t> depth;
-  bool any = false;
   for (const GraphNode& node : graph.nodes) {
     depth.push_back(node.parent >= 0 ? depth[static_cast<std::size_t>(node.parent)] + 1 : 0);
     if (depth.back() > kMaxDepth) fail_scene(file, fmt::format("nests nodes more than {} deep; flatten it", kMaxDepth));
     bool varies_here = false;
     for (const Track* const track : tracks_of(node)) {
       if (!varies(*track)) continue;
-      start_s_ = any ? std::min(start_s_, track->times_s.front()) : track->times_s.front();
-      end_s_ = any ? std::max(end_s_, track->times_s.back()) : track->times_s.back();
-      varies_here = any = true;
+      add_keys(track->times_s);
+      varies_here = true;
     }
     animated_.push_back(varies_here);
+    morphs_.push_back(varies(node.weight_track, target_count(graph, node)));
+    if (morphs_.back()) add_keys(node.weight_track.times_s);
   }
   if (end_s_ - start_s_ < kShortestAnimation_s) {
     animated_.assign(animated_.size(), false);
+    morphs_.assign(morphs_.size(), false);
     start_s_ = end_s_ = 0;
   }
+}
+
+void NodeTransforms::add_keys(const std::vector<double>& times_s) {
+  start_s_ = any_keys_ ? std::min(start_s_, times_s.front()) : times_s.front();
+  end_s_ = any_keys_ ? std::max(end_s_, times_s.back()) : times_s.back();
+  any_keys_ = true;
+}
+
+bool NodeTransforms::moves(std::size_t node) const {
+  const std::vector<std::size_t> nodes = chain(node);
+  return std::any_of(nodes.begin(), nodes.end(), [&](std::size_t i) { return is_animated(i); });
 }
 
 std::vector<std::size_t> NodeTransforms::chain(std::size_t node) const {
@@ -113,13 +131,11 @@ Eigen::Matrix4d NodeTransforms::world(std::size_t node, double t_s) const {
   return transform;
 }
 
-SceneMotion sample_motion(const NodeTransforms& transforms, std::size_t node, const Eigen::Matrix4d& T_node_frame,
-                          const std::string& name, const WarningHandler& warn) {
+SampledMotion sample_motion(const NodeTransforms& transforms, std::size_t node, const Eigen::Matrix4d& T_node_frame) {
   constexpr double kRigid = 1e-3;
   const std::vector<std::size_t> chain = transforms.chain(node);
-  const bool moves = std::any_of(chain.begin(), chain.end(), [&](std::size_t i) { return transforms.is_animated(i); });
   std::vector<double> times = {transforms.start_s()};
-  if (moves) times = baked_times(transforms, chain);
+  if (transforms.moves(node)) times = baked_times(transforms, chain);
   if (times.empty()) times = dense_times(transforms.start_s(), transforms.end_s());
 
   // Rotations are relative to the first one, so that they are continuous for any scale.
@@ -128,12 +144,12 @@ SceneMotion sample_motion(const NodeTransforms& transforms, std::size_t node, co
   const bool invertible = std::abs(first.determinant()) > 1e-12;
   const Eigen::Matrix3d from_first = invertible ? Eigen::Matrix3d(first.inverse()) : first_rotation.transpose();
 
-  SceneMotion motion;
-  bool rigid = true;
+  SampledMotion sampled;
+  SceneMotion& motion = sampled.motion;
   for (const double t_s : times) {
     const Eigen::Matrix4d transform = transforms.world(node, t_s) * T_node_frame;
     const Eigen::Matrix3d turned = transform.topLeftCorner<3, 3>() * from_first, rotation = nearest_rotation(turned);
-    rigid = rigid && (turned - rotation).norm() < kRigid;
+    sampled.rigid = sampled.rigid && (turned - rotation).norm() < kRigid;
     ScenePose pose{to_ns(t_s), {}};
     pose.T_world_object.rotation = Eigen::Quaterniond(Eigen::Matrix3d(rotation * first_rotation)).normalized();
     pose.T_world_object.translation = transform.topRightCorner<3, 1>();
@@ -141,8 +157,7 @@ SceneMotion sample_motion(const NodeTransforms& transforms, std::size_t node, co
     if (!motion.empty() && motion.back().T_world_object.rotation.dot(q) < 0) q.coeffs() *= -1.0;
     motion.push_back(pose);
   }
-  if (!rigid) warn(fmt::format("object {}: animated scale is not supported; it keeps its first value", name));
-  return motion;
+  return sampled;
 }
 
 }  // namespace esim::inline scene

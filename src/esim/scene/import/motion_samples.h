@@ -19,6 +19,12 @@ class NodeTransforms {
   /// Whether the node moves in its parent's frame.
   bool is_animated(std::size_t node) const { return animated_[node]; }
 
+  /// Whether the node moves in the world.
+  bool moves(std::size_t node) const;
+
+  /// Whether the weights of the node's morph targets change.
+  bool morphs(std::size_t node) const { return morphs_[node]; }
+
   /// The times of the first and the last key of all animations; both are 0 if nothing is animated.
   double start_s() const { return start_s_; }
   double end_s() const { return end_s_; }
@@ -31,14 +37,21 @@ class NodeTransforms {
 
  private:
   const SceneGraph& graph_;
-  std::vector<bool> animated_;
+  void add_keys(const std::vector<double>& times_s);
+
+  std::vector<bool> animated_, morphs_;
+  bool any_keys_ = false;
   double start_s_ = 0, end_s_ = 0;
 };
 
-/// The motion of a frame attached to a node, over the complete animation of the graph. Keys that are close together, as
-/// in baked animations, are samples of a smooth motion and are used directly; between other keys, the file's
-/// interpolation is sampled densely. Warns if the motion is not rigid.
-SceneMotion sample_motion(const NodeTransforms& transforms, std::size_t node, const Eigen::Matrix4d& T_node_frame,
-                          const std::string& name, const WarningHandler& warn);
+/// The motion of a frame attached to a node.
+struct SampledMotion {
+  SceneMotion motion;
+  bool rigid = true;  ///< otherwise its scale changes, or it is sheared, which the motion lacks
+};
+
+/// The motion over the complete animation of the graph. Keys that are close together, as in baked animations, are
+/// samples of a smooth motion and are used directly; between other keys, the file's interpolation is sampled densely.
+SampledMotion sample_motion(const NodeTransforms& transforms, std::size_t node, const Eigen::Matrix4d& T_node_frame);
 
 }  // namespace esim::inline scene

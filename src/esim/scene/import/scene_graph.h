@@ -4,32 +4,20 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <filesystem>
+#include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "esim/core/error.h"
+#include "esim/scene/deformation/morph_target.h"
+#include "esim/scene/deformation/skin_weights.h"
+#include "esim/scene/import/track.h"
 #include "esim/scene/mesh.h"
 
 /// The result of every reader of scene files: a tree of nodes, from which a Scene is made. The world's z axis points
 /// up; lengths are in metres.
 namespace esim::inline scene {
-
-enum class Interpolation { step, linear, cubic };
-
-/// A property of a node over time: translation or scale (x y z and an unused number), or rotation (x y z w).
-struct Track {
-  Interpolation interpolation = Interpolation::linear;
-  std::vector<double> times_s;          ///< increasing; empty: the property does not change
-  std::vector<Eigen::Vector4d> values;  ///< one per time; if cubic, three: slope before, value, slope after
-};
-
-/// The track's value, which is constant before its first and after its last time. Rotations have unit norm, and follow
-/// the shorter path. The track must not be empty.
-Eigen::Vector4d value_at(const Track& track, double t_s, bool is_rotation);
-
-/// Whether any of the track's values differ.
-bool varies(const Track& track);
 
 struct GraphNode {
   std::string name;
@@ -40,10 +28,34 @@ struct GraphNode {
   Eigen::Vector3d scale = Eigen::Vector3d::Ones();
   Track translation_track{}, rotation_track{}, scale_track{};
   std::vector<std::uint32_t> meshes{};
+  int skin = -1;                 ///< index; -1: none. With a skin, its joints place the meshes, not the node
+  std::vector<float> weights{};  ///< of the morph targets; empty: those of the mesh
+  WeightTrack weight_track{};
 };
 
 /// The transform from the node's frame to its parent's.
 Eigen::Matrix4d local_transform(const GraphNode& node, double t_s);
+
+/// A transform, and its time derivative per second.
+struct MovingTransform {
+  Eigen::Matrix4d value = Eigen::Matrix4d::Identity(), slope = Eigen::Matrix4d::Zero();
+};
+
+/// As local_transform(), with the derivative.
+MovingTransform moving_local_transform(const GraphNode& node, double t_s);
+
+/// How a mesh may deform: first by morph targets, then by joints.
+struct GraphShape {
+  std::vector<std::shared_ptr<const MorphTarget>> targets;
+  std::vector<float> weights;  ///< of the targets
+  SkinWeights skin;            ///< empty: the mesh has no influences of joints
+};
+
+struct GraphSkin {
+  std::string name;
+  std::vector<std::uint32_t> joints;          ///< nodes
+  std::vector<Eigen::Matrix4d> inverse_bind;  ///< per joint: from the mesh's frame to the joint's, at rest
+};
 
 /// An image of materials: a file that the scene refers to, or embedded bytes.
 struct GraphImage {
@@ -75,7 +87,9 @@ struct GraphCamera {
 
 struct SceneGraph {
   std::vector<GraphNode> nodes;
-  std::vector<Mesh> meshes;  ///< in the frames of their nodes; `material` indexes the materials below
+  std::vector<Mesh> meshes;        ///< in the frames of their nodes; `material` indexes the materials below
+  std::vector<GraphShape> shapes;  ///< per mesh; empty if the format has none
+  std::vector<GraphSkin> skins;
   std::vector<GraphMaterial> materials;
   std::vector<GraphImage> images;
   std::vector<GraphCamera> cameras;
@@ -88,7 +102,9 @@ struct SceneGraph {
 /// Limits of a scene, so that a small file cannot request gigabytes.
 inline constexpr std::size_t kMaxSceneTriangles = std::size_t{1} << 24;
 inline constexpr std::size_t kMaxSceneVertices = std::size_t{1} << 25;
+inline constexpr std::size_t kMaxSceneMorphs = std::size_t{1} << 27;  ///< targets times vertices
 inline constexpr std::size_t kMaxSceneTexels = std::size_t{1} << 28;
+inline constexpr std::size_t kMaxElementsWithoutData = std::size_t{1} << 22;  ///< that a file states to be zero
 inline constexpr std::size_t kMaxSceneKeys = std::size_t{1} << 22;
 
 /// Throws the UserError "scene FILE: REASON".

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "esim/scene/import/gltf_document.h"
+#include "esim/scene/import/gltf/gltf_document.h"
 #include "esim/scene/splats/harmonics.h"
 #include "esim/scene/splats/splat_list.h"
 #include "esim/scene/splats/splat_readers.h"

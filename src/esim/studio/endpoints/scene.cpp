@@ -272,6 +272,8 @@ Response view(const Json& request, const Workshop& workshop) {
     look.camera = rigidly_attached(motion->body->at(look.t), info.T_body_camera);
     const TimeNs within = std::clamp(look.t, motion->simulated.start, motion->simulated.end);
     for (const auto& object : motion->objects) look.objects.push_back(object->at(within));
+    if (std::ranges::any_of(scene->file().scene.objects, &SceneObject::deforms))
+      look.t = within - motion->body->start();  // from where pictures count
   } else {
     for (const SceneMotion& object : scene->file().motions) look.objects.push_back({object.front().T_world_object});
     look.objects.resize(

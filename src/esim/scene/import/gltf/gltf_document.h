@@ -53,8 +53,8 @@ class GltfDocument {
   /// The bytes of all buffers.
   std::size_t bytes() const;
 
-  /// The elements of an accessor of unsigned integers.
-  std::vector<std::uint32_t> integers(std::size_t accessor) const;
+  /// The elements of an accessor of unsigned integers, concatenated.
+  std::vector<std::uint32_t> integers(std::size_t accessor, std::size_t components = 1) const;
 
   std::span<const std::byte> buffer_view(std::size_t index) const;
 
@@ -65,14 +65,18 @@ class GltfDocument {
 
  private:
   struct Accessor {
-    std::span<const std::byte> bytes;  // starting at the first element
+    std::span<const std::byte> bytes;  // starting at the first element; empty: all elements are zero
     std::size_t count = 0, stride = 0;
     int component_type = 0;
     bool normalised = false;
   };
 
   std::size_t whole(const Json& object, const char* name, std::size_t otherwise) const;
+  /// Elements of `element_bytes` each that begin at `byteOffset` of the bufferView that `json` names.
+  Accessor located(const Json& json, std::size_t count, std::size_t element_bytes, const std::string& what) const;
   Accessor accessor(std::size_t index, std::size_t components) const;
+  template <typename T>
+  std::vector<T> elements(std::size_t accessor, std::size_t components, T (*convert)(const std::byte*, int)) const;
   void parse(std::span<const std::byte> text);
   void load_buffers(std::vector<std::byte> binary);
 

@@ -1,11 +1,14 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
 #include <numbers>
 #include <set>
 
 #include "esim/scene/import/folder.h"
-#include "esim/scene/import/gltf_document.h"
+#include "esim/scene/import/gltf/gltf_animations.h"
+#include "esim/scene/import/gltf/gltf_document.h"
+#include "esim/scene/import/gltf/gltf_shapes.h"
 #include "esim/scene/import/scene_graph.h"
 
 namespace esim::inline scene {
@@ -37,7 +40,8 @@ class GltfReader {
     read_materials();
     read_meshes();
     read_nodes();
-    read_animations();
+    read_skins();
+    read_gltf_animations(document_, node_of_, graph_);
     return std::move(graph_);
   }
 
@@ -181,7 +185,7 @@ class GltfReader {
     return result;
   }
 
-  void append(Mesh& mesh, const Json& primitive, const std::string& name) {
+  void append(Mesh& mesh, GraphShape& shape, const Json& primitive, const std::string& name) {
     const Json* const attributes = GltfDocument::find(primitive, "attributes");
     if (attributes == nullptr || GltfDocument::find(*attributes, "POSITION") == nullptr) return;
     const auto positions = document_.floats(accessor_of(*attributes, "POSITION"), 3);
@@ -218,8 +222,8 @@ class GltfReader {
     } else if (slot.texture.image >= 0) {
       warn(fmt::format("mesh {}: has a texture, but its texture coordinates {} are missing", name, slot.coordinates));
     }
-    if (GltfDocument::find(primitive, "targets") != nullptr)
-      warn(fmt::format("mesh {}: shape keys are not supported, and are ignored", name));
+    const bool has_normals = GltfDocument::find(*attributes, "NORMAL") != nullptr;
+    shapes_.append(primitive, {first, vertices, has_normals}, name, shape);
 
     // Data per triangle.
     for (std::size_t i = 0; i + 2 < indices.size(); i += 3) {
@@ -233,12 +237,15 @@ class GltfReader {
   void read_meshes() {
     for (const Json& json : document_.list("meshes")) {
       Mesh mesh;
+      GraphShape shape;
       const Json* const primitives = GltfDocument::find(json, "primitives");
       if (primitives != nullptr && primitives->is_array()) {
         for (const Json& primitive : *primitives)
-          append(mesh, primitive, document_.text(json, "name", "without a name"));
+          append(mesh, shape, primitive, document_.text(json, "name", "without a name"));
       }
+      shapes_.finish(json, shape);
       graph_.meshes.push_back(std::move(mesh));
+      graph_.shapes.push_back(std::move(shape));
     }
   }
 
@@ -291,8 +298,13 @@ class GltfReader {
     }
     if (document_.has_index(json, "mesh"))
       node.meshes.push_back(static_cast<std::uint32_t>(document_.index(json, "mesh", "meshes")));
-    if (GltfDocument::find(json, "skin") != nullptr)
-      warn(fmt::format("object {}: skeletons are not supported; it is shown in its rest pose", node.name));
+    if (document_.has_index(json, "skin"))
+      skinned_.emplace_back(graph_.nodes.size(), document_.index(json, "skin", "skins"));
+    if (document_.has_index(json, "weights") && !node.meshes.empty()) {
+      const std::size_t targets = graph_.shapes[node.meshes.front()].targets.size();
+      const auto weights = document_.numbers(json, "weights", std::vector<double>(targets));
+      node.weights.assign(weights.begin(), weights.end());
+    }
     if (document_.has_index(json, "camera")) read_camera(json, node.name);
     return node;
   }
@@ -313,62 +325,15 @@ class GltfReader {
     graph_.cameras.push_back(std::move(camera));
   }
 
-  Track track(const Json& sampler, std::size_t components) {
-    Track track;
-    const std::string mode = document_.text(sampler, "interpolation", "LINEAR");
-    if (mode == "STEP") track.interpolation = Interpolation::step;
-    if (mode == "CUBICSPLINE") track.interpolation = Interpolation::cubic;
-    const auto times = document_.floats(document_.index(sampler, "input", "accessors"), 1);
-    const auto values = document_.floats(document_.index(sampler, "output", "accessors"), components);
-    const std::size_t per_time = track.interpolation == Interpolation::cubic ? 3 : 1;
-    key_count_ += times.size();
-    if (key_count_ > kMaxSceneKeys) document_.fail(fmt::format("has more than {} animation keys", kMaxSceneKeys));
-    if (times.empty() || values.size() != times.size() * per_time * components)
-      document_.fail("is damaged: an animation must have one value per time");
-    track.times_s.assign(times.begin(), times.end());
-    if (std::adjacent_find(times.begin(), times.end(), std::greater_equal<>()) != times.end() || times.front() < 0 ||
-        times.back() > 1e6F)
-      document_.fail("is damaged: the times of an animation must increase, from 0 or later");
-    for (std::size_t i = 0; i < values.size(); i += components) {
-      Eigen::Vector4d value = Eigen::Vector4d::UnitW();
-      for (std::size_t c = 0; c < components; ++c) value[static_cast<Eigen::Index>(c)] = values[i + c];
-      if (components == 3) value[3] = 0;
-      track.values.push_back(value);
+  /// The skins of the scene's nodes.
+  void read_skins() {
+    std::map<std::size_t, int> skin_of;  // of the graph, per skin of the file
+    for (const auto& [node, skin] : skinned_) {
+      const auto [known, is_new] = skin_of.try_emplace(skin, static_cast<int>(graph_.skins.size()));
+      if (is_new) graph_.skins.push_back(shapes_.skin(skin, node_of_));
+      graph_.nodes[node].skin = known->second;
     }
-    return track;
-  }
-
-  /// All animations play at the same time, since Blender exports one per object.
-  void read_animations() {
-    for (const Json& animation : document_.list("animations")) {
-      const Json* const channels = GltfDocument::find(animation, "channels");
-      const Json* const samplers = GltfDocument::find(animation, "samplers");
-      if (channels == nullptr || samplers == nullptr || !samplers->is_array()) continue;
-      for (const Json& channel : *channels) {
-        const Json* const target = GltfDocument::find(channel, "target");
-        if (target == nullptr || !document_.has_index(*target, "node")) continue;
-        const int index = node_of_[document_.index(*target, "node", "nodes")];
-        const double sampler = document_.number(channel, "sampler", -1);
-        if (!(sampler >= 0 && sampler < static_cast<double>(samplers->size())))
-          document_.fail("is damaged: an animation refers to a missing sampler");
-        if (index >= 0)
-          animate(graph_.nodes[static_cast<std::size_t>(index)], document_.text(*target, "path"),
-                  (*samplers)[static_cast<std::size_t>(sampler)]);
-      }
-    }
-  }
-
-  void animate(GraphNode& node, const std::string& path, const Json& sampler) {
-    if (path != "translation" && path != "rotation" && path != "scale") return;
-    if (node.matrix) document_.fail(fmt::format("is damaged: node {} has a matrix, but is animated", node.name));
-    Track& slot = path == "translation" ? node.translation_track
-                  : path == "rotation"  ? node.rotation_track
-                                        : node.scale_track;
-    if (!slot.times_s.empty()) {
-      warn(fmt::format("object {}: has several animations, of which only the first is shown", node.name));
-      return;
-    }
-    slot = track(sampler, path == "rotation" ? 4 : 3);
+    shapes_.check(graph_);
   }
 
   std::filesystem::path file_;
@@ -377,7 +342,9 @@ class GltfReader {
   std::vector<TextureSlot> slots_;  // of the base colours, per material
   std::vector<int> node_of_;        // of the graph, per node of the file; -1: not in the scene
   std::int32_t plain_material_ = kNoMaterial;
-  std::size_t vertex_count_ = 0, triangle_count_ = 0, key_count_ = 0;
+  std::size_t vertex_count_ = 0, triangle_count_ = 0;
+  GltfShapes shapes_{document_, graph_.warnings};
+  std::vector<std::pair<std::size_t, std::size_t>> skinned_;  // nodes of the graph, skins of the file
 };
 
 }  // namespace

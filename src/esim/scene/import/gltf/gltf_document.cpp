@@ -1,4 +1,4 @@
-#include "esim/scene/import/gltf_document.h"
+#include "esim/scene/import/gltf/gltf_document.h"
 
 #include <fmt/format.h>
 
@@ -19,68 +19,11 @@ using Json = GltfDocument::Json;
 
 constexpr std::uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
 
-enum ComponentType { kByte = 5120, kUnsignedByte, kShort, kUnsignedShort, kUnsignedInt = 5125, kFloat };
-
-std::size_t component_bytes(int type) {
-  switch (type) {
-    case kByte:
-    case kUnsignedByte:
-      return 1;
-    case kShort:
-    case kUnsignedShort:
-      return 2;
-    case kUnsignedInt:
-    case kFloat:
-      return 4;
-    default:
-      return 0;
-  }
-}
-
-std::size_t component_count(const std::string& type) {
-  static constexpr std::array<std::pair<const char*, std::size_t>, 7> kTypes{
-      {{"SCALAR", 1}, {"VEC2", 2}, {"VEC3", 3}, {"VEC4", 4}, {"MAT2", 4}, {"MAT3", 9}, {"MAT4", 16}}};
-  for (const auto& [name, count] : kTypes) {
-    if (type == name) return count;
-  }
-  return 0;
-}
-
 template <typename T>
 T load(const std::byte* from) {
   T value;
   std::memcpy(&value, from, sizeof value);
   return value;
-}
-
-float as_float(const std::byte* from, int type) {
-  switch (type) {
-    case kByte:
-      return std::max(static_cast<float>(load<std::int8_t>(from)) / 127.0F, -1.0F);
-    case kUnsignedByte:
-      return static_cast<float>(load<std::uint8_t>(from)) / 255.0F;
-    case kShort:
-      return std::max(static_cast<float>(load<std::int16_t>(from)) / 32767.0F, -1.0F);
-    case kUnsignedShort:
-      return static_cast<float>(load<std::uint16_t>(from)) / 65535.0F;
-    default:
-      return load<float>(from);
-  }
-}
-
-float as_integer(const std::byte* from, int type) {
-  switch (type) {
-    case kByte:
-      return static_cast<float>(load<std::int8_t>(from));
-    case kUnsignedByte:
-      return static_cast<float>(load<std::uint8_t>(from));
-    case kShort:
-      return static_cast<float>(load<std::int16_t>(from));
-    case kUnsignedShort:
-      return static_cast<float>(load<std::uint16_t>(from));
-    default:
-      return static_cast<float>(load<std::uint32_t>(from));
-  }
 }
 
 /// Whether a number is finite, also in single precision.
@@ -245,81 +188,10 @@ std::span<const std::byte> GltfDocument::buffer_view(std::size_t index_of_view) 
   return {buffer.data() + offset, length};
 }
 
-GltfDocument::Accessor GltfDocument::accessor(std::size_t index_of_accessor, std::size_t components) const {
-  const Json& json = list("accessors")[index_of_accessor];
-  if (find(json, "sparse") != nullptr) fail("has sparse accessors, which are not supported; export it without them");
-  Accessor result;
-  result.count = whole(json, "count", 0);
-  result.component_type = static_cast<int>(whole(json, "componentType", 0));
-  result.normalised = flag(json, "normalized");
-  const std::size_t element = component_bytes(result.component_type) * components;
-  if (element == 0 || component_count(text(json, "type")) != components)
-    fail(fmt::format("is damaged: accessor {} has the wrong type for its use", index_of_accessor));
-
-  const std::size_t view = index(json, "bufferView", "bufferViews");
-  const std::size_t stride = whole(list("bufferViews")[view], "byteStride", 0);
-  result.stride = stride == 0 ? element : stride;
-  result.bytes = buffer_view(view);
-  const std::size_t offset = whole(json, "byteOffset", 0);
-  const bool fits =
-      offset <= result.bytes.size() && result.stride >= element &&
-      (result.count == 0 || (result.bytes.size() - offset >= element &&
-                             result.count - 1 <= (result.bytes.size() - offset - element) / result.stride));
-  if (!fits) fail(fmt::format("is damaged: accessor {} is beyond the end of its bufferView", index_of_accessor));
-  result.bytes = result.bytes.subspan(offset);
-  return result;
-}
-
-std::vector<float> GltfDocument::floats(std::size_t index_of_accessor, std::size_t components) const {
-  const Accessor from = accessor(index_of_accessor, components);
-  if (from.component_type != kFloat && !from.normalised)
-    fail(fmt::format("is damaged: accessor {} contains integers instead of floats", index_of_accessor));
-  std::vector<float> values = unchecked_floats(index_of_accessor, components);
-  if (!std::all_of(values.begin(), values.end(), [](float value) { return std::isfinite(value); }))
-    fail(fmt::format("accessor {} contains a number that is not finite", index_of_accessor));
-  return values;
-}
-
-std::vector<float> GltfDocument::unchecked_floats(std::size_t index_of_accessor, std::size_t components) const {
-  const Accessor from = accessor(index_of_accessor, components);
-  const std::size_t step = component_bytes(from.component_type);
-  const auto convert = from.component_type == kFloat || from.normalised ? as_float : as_integer;
-  std::vector<float> values;
-  values.reserve(from.count * components);
-  for (std::size_t i = 0; i < from.count; ++i) {
-    for (std::size_t c = 0; c < components; ++c)
-      values.push_back(convert(&from.bytes[i * from.stride + c * step], from.component_type));
-  }
-  return values;
-}
-
 std::size_t GltfDocument::bytes() const {
   std::size_t sum = 0;
   for (const std::vector<std::byte>& buffer : buffers_) sum += buffer.size();
   return sum;
-}
-
-std::vector<std::uint32_t> GltfDocument::integers(std::size_t index_of_accessor) const {
-  const Accessor from = accessor(index_of_accessor, 1);
-  std::vector<std::uint32_t> values;
-  values.reserve(from.count);
-  for (std::size_t i = 0; i < from.count; ++i) {
-    const std::byte* const at = &from.bytes[i * from.stride];
-    switch (from.component_type) {
-      case kUnsignedByte:
-        values.push_back(load<std::uint8_t>(at));
-        break;
-      case kUnsignedShort:
-        values.push_back(load<std::uint16_t>(at));
-        break;
-      case kUnsignedInt:
-        values.push_back(load<std::uint32_t>(at));
-        break;
-      default:
-        fail(fmt::format("is damaged: accessor {} does not contain indices", index_of_accessor));
-    }
-  }
-  return values;
 }
 
 std::vector<std::byte> GltfDocument::data_uri(const std::string& uri) const {

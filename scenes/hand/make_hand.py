@@ -13,7 +13,7 @@ HERE = os.path.dirname(os.path.abspath(__file__))
 sys.path[:0] = [os.path.join(HERE, "..", "meshing"), os.path.join(HERE, "..", "room")]
 sys.dont_write_bytecode = True
 
-from fields import cone, ellipsoid, intersection, below, sphere, union  # noqa: E402
+from fields import below, cone, ellipsoid, intersection, sphere, union  # noqa: E402
 from glb import Glb  # noqa: E402
 from paint import around_turns, coded, texels  # noqa: E402
 from room_noise import fbm, mix, srgb, step  # noqa: E402

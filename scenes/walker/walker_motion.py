@@ -6,7 +6,7 @@ import numpy as np
 
 from make_trajectory import bspline
 from rotations import about, frame, matrices, quaternions, transposed
-from walker_body import ANKLE, ARM, ELBOW, HEEL, HIP, JOINTS, KNEE, NUMBER, RIGHT, TOE, WRIST
+from walker_body import ANKLE, ARM, HEEL, HIP, JOINTS, KNEE, NUMBER, RIGHT, TOE
 
 DURATION, RATE = 5.0, 60
 # The way through the room: from the sideboard past the door and the vase to the curtain, between the rug and the chest.

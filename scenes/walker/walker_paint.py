@@ -1,7 +1,8 @@
 """Textures of the walking figure, and of what stands beside its way: functions that return (height, width, 3) in sRGB, 8 bits."""
 import numpy as np
 
-from paint import around_turns as around, coded, texels
+from paint import around_turns as around
+from paint import coded, texels
 from room_noise import mix, srgb, step
 
 

@@ -123,6 +123,8 @@ class Converter {
         material.emission = {colour.r, colour.g, colour.b};
       material.emission_texture = texture(source, aiTextureType_EMISSIVE);
       if (material.emission_texture.image >= 0) material.emission.setOnes();
+      int shading = 0;  // none: "illum 0" of MTL, "constant" of Collada
+      material.unlit = source.Get(AI_MATKEY_SHADING_MODEL, shading) == AI_SUCCESS && shading == aiShadingMode_NoShading;
       if (source.GetTextureCount(aiTextureType_NORMALS) + source.GetTextureCount(aiTextureType_HEIGHT) > 0)
         ++graph_.normal_maps;
       if (!material.base.allFinite() || !material.emission.allFinite())

@@ -106,7 +106,7 @@ test("an object moves by waypoints of its own: dropped, drawn, flown and saved",
 test("a person walks along the time line, and back", async () => {
   write(
     "walking.yaml",
-    `${room}  lighting: {type: pbr, ambient: 0.4, suns: [{direction: [0.3, -0.6, -0.75], strength: 0.8}]}\n  objects:\n  - {name: walker, scene: walker.glb, trajectory: {type: static}, animation: {time_scale: 0.5}}\ntrajectory: {type: static, pose: {position: [-0.4, 1.3, 1.5], look_at: [0.3, -1, 1]}}\nduration_s: 3\n${camera}`,
+    `${room}  lighting: {type: lambert, ambient: 0.4, suns: [{direction: [0.3, -0.6, -0.75], strength: 0.8}]}\n  objects:\n  - {name: walker, scene: walker.glb, trajectory: {type: static}, animation: {time_scale: 0.5}}\ntrajectory: {type: static, pose: {position: [-0.4, 1.3, 1.5], look_at: [0.3, -1, 1]}}\nduration_s: 3\n${camera}`,
   );
   const page = await design("walking.yaml");
   await until(async () => / of /.test(await clock(page).textContent()), "the flight");

@@ -2,7 +2,8 @@
 # built it.
 function(esim_install_data folder)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/scenes DESTINATION ${folder} ${ARGN}
-          PATTERN "*.py" EXCLUDE PATTERN "*.blend" EXCLUDE PATTERN "studio_room.yaml" EXCLUDE PATTERN "__pycache__" EXCLUDE)
+          PATTERN "*.py" EXCLUDE PATTERN "*.blend" EXCLUDE PATTERN "studio_room.yaml" EXCLUDE PATTERN "meshing" EXCLUDE
+          PATTERN "__pycache__" EXCLUDE)
   install(DIRECTORY ${PROJECT_SOURCE_DIR}/docs DESTINATION ${folder} ${ARGN}
           PATTERN "*.py" EXCLUDE PATTERN "Doxyfile" EXCLUDE PATTERN "docs/site" EXCLUDE PATTERN "__pycache__" EXCLUDE)
   install(FILES ${PROJECT_SOURCE_DIR}/README.md ${PROJECT_SOURCE_DIR}/ARCHITECTURE.md DESTINATION ${folder} ${ARGN})  # which the pages link to

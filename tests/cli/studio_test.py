@@ -276,6 +276,41 @@ class Answers(StudioTest):
             self.assertEqual(self.server.request("GET", scene["glb"].removesuffix(".glb") + f"/{wrong}.splat")[0], 404, wrong)
         self.assertEqual(self.server.request("GET", still["splats"]["file"], token=False)[0], 401)
 
+    def test_objects_that_deform_have_shapes(self):
+        """The simulation's shapes, on the clock of the body's trajectory: an object of the scenario has an animation clock of its own."""
+        shutil.copy(SCENES / "hand/hand.glb", self.work)
+        objects = ("  objects:\n  - {name: slow, scene: hand.glb, trajectory: {type: static}, animation: {time_scale: 2, offset_s: 1}}\n"
+                   "  - {name: still, scene: still.obj, trajectory: {type: static}}\n")
+        (self.work / "still.obj").write_text("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 3\n")
+        yaml = f"renderer:\n  type: mesh\n  scene: hand.glb\n{objects}trajectory: {{type: static}}\nduration_s: 2\n"
+        scene = self.ask("POST", "/api/scene", {"yaml": yaml, "dir": "work"})
+        by_name = {one["name"]: one for one in scene["objects"]}
+        slow, still, plain = by_name["slow"], by_name["still"], scene["objects"][0]
+        self.assertIsNone(still["shapes"])
+        shapes = plain["shapes"]
+        self.assertEqual((shapes["rate_hz"], shapes["start"], shapes["end"]), (30, 0, 5_000_000_000))
+        size = 24 + 8 * shapes["vertices"]
+
+        def shape(of, first, count=1):
+            status, headers, body = self.server.request("GET", f"{of['shapes']['file']}?first={first}&count={count}")
+            self.assertEqual((status, headers["Content-Type"], len(body)), (200, "application/octet-stream", count * size), body[:200])
+            return body
+
+        both = shape(plain, 33, 2)
+        self.assertEqual(both, shape(plain, 33) + shape(plain, 34))
+        self.assertNotEqual(both[:size], both[size:])
+        self.assertEqual(shape(plain, 150), shape(plain, 10_000))       # it rests after its end
+        self.assertEqual(shape(slow, 0), shape(plain, 30))              # it begins at 1 s
+        self.assertEqual(shape(slow, 60), shape(plain, 60))             # 2 s are 1 s of its own time
+        for query in ("", "?first=0", "?count=1", "?first=-1&count=1", "?first=x&count=1", "?first=0&count=0", "?first=0&count=1e9",
+                      "?first=0&count=100000", "?first=18446744073709551615&count=1", "?first=2000000000&count=1"):
+            self.assertEqual(self.server.request("GET", shapes["file"] + query)[0], 400, query)
+        base = scene["glb"].removesuffix(".glb")
+        index = scene["objects"].index(still)
+        for wrong in (f"{index}", "99", "-1", "x"):
+            self.assertEqual(self.server.request("GET", f"{base}/{wrong}.shapes?first=0&count=1")[0], 404, wrong)
+        self.assertEqual(self.server.request("GET", f"{shapes['file']}?first=0&count=1", token=False)[0], 401)
+
     def test_the_motion_is_the_simulators(self):
         motion = self.ask("POST", "/api/trajectory", self.scenario(samples=11))
         self.assertEqual(len(motion["poses"]), 11)

@@ -241,6 +241,17 @@ TEST(SceneFile, ObjAndPlyAreTakenAsTheyAre) {
   }
 }
 
+TEST(SceneFile, ObjMaterialsWithoutIlluminationAreUnlit) {
+  const test::TemporaryDirectory folder;
+  folder.write("a.mtl", "newmtl baked\nKd 1 1 1\nillum 0\nnewmtl lit\nKd 1 1 1\nillum 1\nnewmtl plain\nKd 1 1 1\n");
+  const auto obj = folder.write("a.obj",
+                                "mtllib a.mtl\nv 1 2 3\nv 4 5 6\nv 7 8 10\n"
+                                "usemtl baked\nf 1 2 3\nusemtl lit\nf 2 3 1\nusemtl plain\nf 3 1 2\n");
+  const std::vector<Material> materials = load(obj).scene.objects.at(0).mesh.materials;
+  for (const Material& material : materials) EXPECT_EQ(material.unlit, material.name == "baked") << material.name;
+  EXPECT_GE(materials.size(), 3U);
+}
+
 TEST(SceneFile, ReadsTheOriginalsRoomAndFootball) {
   const auto room = test::test_data("mesh/flying_room/flying_room.obj");
   const auto ball = test::test_data("mesh/football/americanfootball.obj");

@@ -42,6 +42,8 @@ export const trajectory = (source: Source, signal?: AbortSignal) =>
 export const view = (source: Source, camera: string, at: { t: number } | { pose: Pose }, signal?: AbortSignal) =>
   postForPicture("/api/view", { ...source, camera, ...at }, signal);
 
+export const getShapes = (file: string, first: number, count: number) => getBytes(file, { first, count });
+
 export const startRun = (path: string, out: string | undefined, overwrite: boolean) =>
   sendJson<{ id: string }>("POST", "/api/runs", { path, ...(out ? { out } : {}), overwrite });
 export const runs = () => getJson<RunState[]>("/api/runs");

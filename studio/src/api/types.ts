@@ -75,6 +75,16 @@ export interface SplatFile {
   filter: "dilated" | "antialiased" | "mip";
 }
 
+/** Shapes of a deforming object: `rate_hz` per second, from the start of the body's trajectory on. */
+export interface ShapeFile {
+  file: string;
+  vertices: number;
+  rate_hz: number;
+  /** When it deforms, since the start of the body's trajectory [ns]; it rests before and after. */
+  start: number;
+  end: number;
+}
+
 export interface SceneInfo {
   kind: "mesh" | "splats" | "panorama" | "plane" | "sprites" | "engine";
   glb: string | null;
@@ -86,7 +96,7 @@ export interface SceneInfo {
   middle?: [[number, number, number], [number, number, number]] | null;
   /** Of the rig; look_at of waypoints refers to the first. */
   cameras: [CameraModel, ...CameraModel[]];
-  objects: { name: string; glb_node: string; moving: boolean; splats: SplatFile | null }[];
+  objects: { name: string; glb_node: string; moving: boolean; splats: SplatFile | null; shapes?: ShapeFile | null }[];
   world?: {
     plane?: { pose: Pose; width_m: number; height_m: number; endless: boolean };
     panorama?: { orientation: [number, number, number, number] };

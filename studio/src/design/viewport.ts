@@ -378,7 +378,8 @@ export class Viewport {
     this.now.visible = flying && this.info?.kind !== "panorama";
     this.now.matrix.copy(this.eyePose).scale(this.nowScale);
     this.now.matrixWorldNeedsUpdate = true;
-    this.content.place(state.tracks, state.playhead.value);
+    const start = state.trajectory.value?.t[0];
+    if (start !== undefined) this.content.place(state.tracks, state.playhead.value, start);
     this.placeEye();
     this.stage.invalidate();
   }

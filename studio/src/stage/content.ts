@@ -26,6 +26,7 @@ import type { Json, SceneInfo } from "../api/types.ts";
 import { anisotropy, drawnBySoftware } from "./gpu.ts";
 import { matrixOf, PoseTrack } from "./frames.ts";
 import { loadMesh, loadWhole, type Made } from "./mesh.ts";
+import { Shapes } from "./shapes.ts";
 import { loadSplats } from "./splats.ts";
 
 /** Waits for a number of frames. */
@@ -43,6 +44,7 @@ export class SceneContent {
   private coarse = false;
   private made: Made = { group: new Group(), details: [], small: [] };
   private splats: (SplatMesh | null)[] = [];
+  private shapes: Shapes[] = [];
   private raycaster = new Raycaster();
 
   /** `changed` is called when its appearance changes. */
@@ -70,6 +72,10 @@ export class SceneContent {
     this.group.add(made.group);
     for (const mesh of splats) if (mesh) this.group.add(mesh);
     this.nodes = info.objects.map((object, i) => splats[i] ?? made.group.getObjectByName(object.glb_node) ?? null);
+    this.shapes = info.objects.flatMap(({ shapes }, i) => {
+      const node = this.nodes[i];
+      return shapes && node ? [new Shapes(shapes, node, this.changed)] : [];
+    });
     this.group.updateMatrixWorld(true);
     this.bounds.makeEmpty();
     const box = info.middle ?? info.bounds;
@@ -110,6 +116,8 @@ export class SceneContent {
     this.coarsen(false);
     for (const mesh of this.splats) mesh?.dispose();
     this.splats = [];
+    for (const shapes of this.shapes) shapes.close();
+    this.shapes = [];
     this.group.traverse((object) => {
       if (!(object instanceof Mesh)) return;
       object.geometry.dispose();
@@ -118,13 +126,15 @@ export class SceneContent {
         material.dispose();
       }
     });
+    this.made.surroundings?.dispose();
     this.group.clear();
     this.nodes = [];
     this.made = { group: new Group(), details: [], small: [] };
   }
 
-  /** Moves the objects to their poses at a time. */
-  place(tracks: (PoseTrack | undefined)[], time: number): void {
+  /** Moves the objects to their poses at a time, and deforms them. The body's trajectory begins at `start`. */
+  place(tracks: (PoseTrack | undefined)[], time: number, start: number): void {
+    for (const shapes of this.shapes) shapes.show(time - start);
     for (let i = 0; i < this.nodes.length; ++i) {
       const node = this.nodes[i];
       const track = tracks[i];

@@ -2,15 +2,20 @@ import {
   AmbientLight,
   BufferGeometry,
   type BufferAttribute,
+  DataTexture,
+  DataUtils,
   DirectionalLight,
+  EquirectangularReflectionMapping,
   Group,
+  HalfFloatType,
   ImageBitmapLoader,
   Mesh,
   MeshBasicMaterial,
   MeshLambertMaterial,
-  type MeshStandardMaterial,
+  MeshStandardMaterial,
   type Object3D,
   PointLight,
+  RGBAFormat,
   Source,
   type Texture,
 } from "three";
@@ -18,6 +23,9 @@ import { type GLTF, GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import type { Json } from "../api/types.ts";
 import { getIn } from "../document/values.ts";
 import { anisotropy } from "./gpu.ts";
+
+/** The materials of the page. */
+type Shown = MeshBasicMaterial | MeshLambertMaterial | MeshStandardMaterial;
 
 /** A surface with all triangles and with few, which share vertices. */
 interface Detail {
@@ -30,7 +38,7 @@ interface Detail {
 interface SmallTexture {
   texture: Texture;
   url: string;
-  materials: (MeshBasicMaterial | MeshLambertMaterial)[];
+  materials: Shown[];
 }
 
 /** The objects made from a scene. */
@@ -38,37 +46,50 @@ export interface Made {
   group: Group;
   details: Detail[];
   small: SmallTexture[];
+  /** What glossy surfaces reflect. */
+  surroundings?: Texture;
 }
 
 /** A scene file of the server. */
 export async function loadMesh(url: string, lighting: Json | undefined): Promise<Made> {
   const gltf = await new GLTFLoader().loadAsync(url);
   const made: Made = { group: new Group(), details: [], small: [] };
-  const lit = ["lambert", "pbr"].includes(String(getIn(lighting, "type")));
+  const type = getIn(lighting, "type");
+  const model = type === "lambert" || type === "pbr" ? type : "unlit";
+  const lit = model !== "unlit";
   const meshes: Mesh[] = [];
   gltf.scene.traverse((object) => {
     if (object instanceof Mesh) meshes.push(object);
   });
   for (const mesh of meshes) {
-    mesh.material = materialOf(mesh.material as MeshStandardMaterial, lit, url, made);
-    if (lit && !mesh.geometry.getAttribute("normal")) mesh.geometry.computeVertexNormals();
+    mesh.material = materialOf(mesh.material as MeshStandardMaterial, model, url, made);
+    if (lit && !mesh.geometry.getAttribute("normal")) {
+      mesh.geometry.computeVertexNormals();
+      mesh.userData["flat"] = true;
+    }
     await addCoarse(mesh, gltf, made);
+    const { vertices } = mesh.geometry.userData as { vertices?: number };
+    if (vertices !== undefined) mesh.userData["vertices"] = await gltf.parser.getDependency("accessor", vertices);
   }
   made.group.add(gltf.scene);
+  if (model === "lambert") made.group.add(ambientLight(lighting));
+  if (model === "pbr") made.surroundings = surround(made, lighting);
   if (lit) made.group.add(...lights(lighting));
   return made;
 }
 
 function materialOf(
   given: MeshStandardMaterial | MeshBasicMaterial,
-  lit: boolean,
+  model: "unlit" | "lambert" | "pbr",
   url: string,
   made: Made,
-): MeshBasicMaterial | MeshLambertMaterial {
+): Shown {
   const { map } = given;
   const options = { map, color: given.color, side: given.side };
-  const shaded = lit && !(given instanceof MeshBasicMaterial);
-  const material = shaded ? new MeshLambertMaterial(options) : new MeshBasicMaterial(options);
+  let material: Shown;
+  if (model === "unlit" || given instanceof MeshBasicMaterial) material = new MeshBasicMaterial(options);
+  else if (model === "lambert") material = new MeshLambertMaterial(options);
+  else material = new MeshStandardMaterial({ ...options, metalness: given.metalness, roughness: given.roughness });
   given.dispose();
   if (!map) return material;
   map.anisotropy = anisotropy();
@@ -105,16 +126,39 @@ async function addCoarse(mesh: Mesh, gltf: GLTF, made: Made): Promise<void> {
 }
 
 /** Lambertian irradiance of a white surface is `strength`; three.js divides by pi. */
+function ambientLight(lighting: Json | undefined): AmbientLight {
+  return new AmbientLight(0xffffff, Number(getIn(lighting, "ambient") ?? 0.3) * Math.PI);
+}
+
+/** The same light from all directions, which glossy surfaces reflect too. */
+function surround(made: Made, lighting: Json | undefined): Texture {
+  const light = DataUtils.toHalfFloat(Number(getIn(lighting, "ambient") ?? (getIn(lighting, "environment") ? 0 : 0.3)));
+  const [width, height] = [4, 2];
+  const opaque = DataUtils.toHalfFloat(1);
+  const values = Array.from({ length: width * height }, () => [light, light, light, opaque]).flat();
+  const texture = new DataTexture(new Uint16Array(values), width, height, RGBAFormat, HalfFloatType);
+  texture.mapping = EquirectangularReflectionMapping;
+  texture.needsUpdate = true;
+  made.group.traverse((object) => {
+    if (object instanceof Mesh && object.material instanceof MeshStandardMaterial) object.material.envMap = texture;
+  });
+  return texture;
+}
+
 function lights(lighting: Json | undefined): Object3D[] {
-  const result: Object3D[] = [new AmbientLight(0xffffff, Number(getIn(lighting, "ambient") ?? 0.3) * Math.PI)];
-  for (const sun of (getIn(lighting, "suns") as Json[] | undefined) ?? []) {
-    const light = new DirectionalLight(0xffffff, Number(getIn(sun, "strength") ?? 1) * Math.PI);
-    light.position.fromArray((getIn(sun, "direction") as number[] | undefined) ?? [0, 0, -1]).negate();
+  const result: Object3D[] = [];
+  const listed = (name: string) => (getIn(lighting, name) as Json[] | undefined) ?? [];
+  const vector = (light: Json, name: string, otherwise: number[]) =>
+    (getIn(light, name) as number[] | undefined) ?? otherwise;
+  const strength = (light: Json) => Number(getIn(light, "strength") ?? 1) * Math.PI;
+  for (const sun of listed("suns")) {
+    const light = new DirectionalLight(0xffffff, strength(sun));
+    light.position.fromArray(vector(sun, "direction", [0, 0, -1])).negate();
     result.push(light);
   }
-  for (const point of (getIn(lighting, "points") as Json[] | undefined) ?? []) {
-    const light = new PointLight(0xffffff, Number(getIn(point, "strength") ?? 1) * Math.PI, 0, 2);
-    light.position.fromArray((getIn(point, "position") as number[] | undefined) ?? [0, 0, 0]);
+  for (const point of listed("points")) {
+    const light = new PointLight(0xffffff, strength(point), 0, 2);
+    light.position.fromArray(vector(point, "position", [0, 0, 0]));
     result.push(light);
   }
   return result;

@@ -139,6 +139,8 @@ class Converter {
       material.emission_texture = texture(source, aiTextureType_EMISSIVE);
       if (material.emission_texture.image >= 0) material.emission.setOnes();
       read_gloss(source, material);
+      int shading = 0;  // none: "illum 0" of MTL, "constant" of Collada
+      material.unlit = source.Get(AI_MATKEY_SHADING_MODEL, shading) == AI_SUCCESS && shading == aiShadingMode_NoShading;
       if (!material.base.allFinite() || !material.emission.allFinite())
         fail_scene(file_, fmt::format("a colour of material {} is not finite", material.name));
       if (!std::isfinite(material.roughness) || !std::isfinite(material.metallic))

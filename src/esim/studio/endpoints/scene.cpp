@@ -9,6 +9,7 @@
 #include "esim/studio/editor/scenario_check.h"
 #include "esim/studio/endpoints/endpoints.h"
 #include "esim/studio/scene_view/first_view.h"
+#include "esim/studio/scene_view/page_shapes.h"
 
 namespace esim::studio {
 namespace {
@@ -107,6 +108,17 @@ Json splats_json(const std::optional<PageSplats>& splats, const std::string& add
           {"filter", kEnumNames<SplatFilter>[static_cast<std::size_t>(splats->filter)]}};
 }
 
+/// How an object deforms, on a clock that starts with the body's trajectory; null if it is rigid.
+Json shapes_json(const SceneObject& object, const std::string& address) {
+  if (!object.deformation) return nullptr;
+  const TimeSpan span = object.deformation->span();
+  return {{"file", address},
+          {"vertices", object.mesh.vertices.size()},
+          {"rate_hz", kShapesPerSecond},
+          {"start", span.start},
+          {"end", span.end}};
+}
+
 Json scene_json(const Scenario& scenario, SceneStore& scenes) {
   if (engine_objects(scenario.renderer) != nullptr) return engine_json(scenario);
   const auto scene = scenes.of(scenario);
@@ -126,6 +138,7 @@ Json scene_json(const Scenario& scenario, SceneStore& scenes) {
     answer["objects"].push_back({{"name", object.name},
                                  {"glb_node", scene->glb() ? scene->glb()->nodes[i] : ""},
                                  {"moving", object.moves},
+                                 {"shapes", shapes_json(object, fmt::format("{}/{}.shapes", base, i))},
                                  {"splats", splats_json(scene->splats()[i], fmt::format("{}/{}.splat", base, i))}});
   }
   return answer;
@@ -155,9 +168,30 @@ std::optional<std::size_t> number_in(std::string_view text) {
   return failure == std::errc() && end == text.data() + text.size() ? std::optional(number) : std::nullopt;
 }
 
-/// A texture of a mesh in full resolution, or the splats of an object.
+/// Numbers of the query: the first shape, and how many.
+Response shapes_of(const Request& request, const Deformation& deformation, std::size_t vertices) {
+  const auto number = [&](const char* name, double low, double high) {
+    const auto found = request.query.find(name);
+    const auto value = number_in(found == request.query.end() ? "" : found->second);
+    if (!value || static_cast<double>(*value) < low || static_cast<double>(*value) > high)
+      throw HttpError(400, fmt::format("{}: must be a number from {} to {}", name, low, high));
+    return *value;
+  };
+  constexpr double kMaxShape = 1e9;  // a year
+  const std::size_t first = number("first", 0, kMaxShape);
+  const std::size_t most =
+      std::max<std::size_t>(1, kMaxShapeBytes / (kShapeVertexBytes * std::max<std::size_t>(1, vertices)));
+  Response response;
+  response.headers = {{"Cache-Control", kKept}};
+  response.content_type = content_type_of(request.captured[1]);
+  response.body =
+      page_shapes(deformation, static_cast<std::int64_t>(first), number("count", 1, static_cast<double>(most)));
+  return response;
+}
+
+/// A texture of a mesh in full resolution, or the splats or the shapes of an object.
 Response scene_part(const Request& request, SceneStore& scenes) {
-  constexpr std::string_view kSplats = ".splat";
+  constexpr std::string_view kSplats = ".splat", kShapes = ".shapes";
   const auto scene = scenes.find(request.captured[0]);
   if (scene == nullptr) throw HttpError(404, kForgotten);
   std::string_view name = request.captured[1];
@@ -171,6 +205,14 @@ Response scene_part(const Request& request, SceneStore& scenes) {
     response.content_type = content_type_of(request.captured[1]);
     response.body = scene->splats()[*index]->bytes;
     return response;
+  }
+  if (name.ends_with(kShapes)) {
+    name.remove_suffix(kShapes.size());
+    const auto index = number_in(name);
+    const std::vector<SceneObject>& objects = scene->file().scene.objects;
+    if (!index || *index >= objects.size() || !objects[*index].deformation)
+      throw HttpError(404, request.path + ": no such shapes");
+    return shapes_of(request, *objects[*index].deformation, objects[*index].mesh.vertices.size());
   }
   const auto index = number_in(name);
   const auto image = index ? scene->image(*index) : nullptr;

@@ -113,7 +113,7 @@ class Writer {
     names_.push_back(name);
     Json node{{"name", name}};
     if (!object.mesh.triangles.empty()) {
-      Json primitives = primitives_of(object.mesh);
+      Json primitives = primitives_of(object);
       node["mesh"] = gltf_["meshes"].size();
       gltf_["meshes"].push_back({{"primitives", std::move(primitives)}});
     }
@@ -122,13 +122,14 @@ class Writer {
   }
 
   /// One primitive per material.
-  Json primitives_of(const Mesh& mesh) {
+  Json primitives_of(const SceneObject& object) {
+    const Mesh& mesh = object.mesh;
     std::map<std::uint32_t, std::vector<std::uint32_t>> triangles;
     for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) triangles[mesh.material[i]].push_back(i);
     Json primitives = Json::array();
     std::vector<std::uint32_t> first_of(mesh.vertices.size(), kNone);
     for (const auto& [material, of] : triangles) {
-      Json primitive = geometry(mesh, of, first_of);
+      Json primitive = geometry(object, of, first_of);
       for (const std::uint32_t triangle : of) {
         for (const std::uint32_t vertex : mesh.triangles[triangle]) first_of[vertex] = kNone;
       }
@@ -140,7 +141,9 @@ class Writer {
 
   /// Corners of triangles share a vertex unless their texture coordinates differ. `first_of` must be empty for each of
   /// the mesh's vertices.
-  Json geometry(const Mesh& mesh, const std::vector<std::uint32_t>& triangles, std::vector<std::uint32_t>& first_of) {
+  Json geometry(const SceneObject& object, const std::vector<std::uint32_t>& triangles,
+                std::vector<std::uint32_t>& first_of) {
+    const Mesh& mesh = object.mesh;
     struct Corner {
       std::uint32_t vertex;
       float u, v;
@@ -156,7 +159,7 @@ class Writer {
     const bool shaded = lit_ && mesh.normals.size() == mesh.vertices.size();
     std::unordered_map<Corner, std::uint32_t, Hash> others;
     std::vector<float> positions, normals, uvs;
-    std::vector<std::uint32_t> indices;
+    std::vector<std::uint32_t> indices, vertices;
     indices.reserve(3 * triangles.size());
     const auto index_of = [&](const Corner& corner) {
       const auto next = static_cast<std::uint32_t>(positions.size() / 3);
@@ -172,6 +175,7 @@ class Writer {
         indices.push_back(index_of(corner));
         const bool is_new = indices.back() == positions.size() / 3;
         if (!is_new) continue;
+        vertices.push_back(corner.vertex);
         const Eigen::Vector3f& at = mesh.vertices[corner.vertex];
         positions.insert(positions.end(), {at.x(), at.y(), at.z()});
         uvs.insert(uvs.end(), {uv.x(), uv.y()});
@@ -189,8 +193,9 @@ class Writer {
     if (triangles_ > kFewTriangles) {
       const std::size_t share = kCoarseTriangles * triangles.size() / triangles_;
       const std::vector<std::uint32_t> coarse = coarse_indices({positions, uvs, indices}, share);
-      if (!coarse.empty()) primitive["extras"] = {{"coarse", accessor(coarse, "SCALAR", kUint32, kIndices)}};
+      if (!coarse.empty()) primitive["extras"]["coarse"] = accessor(coarse, "SCALAR", kUint32, kIndices);
     }
+    if (object.deformation) primitive["extras"]["vertices"] = accessor(vertices, "SCALAR", kUint32, std::nullopt);
     return primitive;
   }
 
@@ -202,7 +207,7 @@ class Writer {
   }
 
   template <typename T>
-  std::size_t accessor(const std::vector<T>& numbers, const char* type, int component, int target) {
+  std::size_t accessor(const std::vector<T>& numbers, const char* type, int component, std::optional<int> target) {
     const std::size_t per_item = std::strcmp(type, "SCALAR") == 0 ? 1 : static_cast<std::size_t>(type[3] - '0');
     const auto view = add_view({reinterpret_cast<const char*>(numbers.data()), numbers.size() * sizeof(T)}, target);
     gltf_["accessors"].push_back(

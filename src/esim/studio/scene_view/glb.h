@@ -21,7 +21,8 @@ struct Glb {
 
 /// One node per object, in the object's frame; unlit if the scene has no lights. In scenes with more than 100 000
 /// triangles, the `extras` of each primitive have `coarse`, an accessor of the indices of far fewer triangles with the
-/// same vertices. The scene must be loaded with SceneLook::coded.
+/// same vertices. The `extras` of the primitives of a deforming object have `vertices`, an accessor of the mesh's
+/// vertex for each of theirs. The scene must be loaded with SceneLook::coded.
 Glb make_glb(const Scene& scene, const Workers& workers);
 
 /// The maximum number of triangles for a browser.

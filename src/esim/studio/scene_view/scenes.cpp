@@ -87,6 +87,7 @@ StudioScene::StudioScene(const Scenario& scenario, std::string id, int threads)
       scenario_(scenario),
       threads_(threads),
       file_(load_scenes(scenario, SceneLook::coded, kSilent)) {
+  play_deformations(scenario, 0, file_);
   if (fails_when_made(scenario.renderer, file_.scene)) pictures();
   splats_ = page_splats(file_.scene);
   for (SceneObject& object : file_.scene.objects) object.splats = nullptr;  // they may take gigabytes

@@ -20,7 +20,7 @@ class StudioScene {
 
   const std::string& id() const { return id_; }
 
-  /// The scene with coded textures (see SceneLook) and without splats.
+  /// The scene with coded textures (see SceneLook) and without splats. Its deformations are played from time 0 on.
   const SceneFile& file() const { return file_; }
 
   /// For meshes, also among splats; empty for other scenes and for too many triangles.

@@ -25,6 +25,7 @@ let state;
 
 before(async () => {
   cpSync(join(scenes, "studio_room/ball.glb"), join(files.folder, "ball.glb"));
+  cpSync(join(scenes, "walker/walker.glb"), join(files.folder, "walker.glb"));
 });
 after(() => state?.context.close());
 
@@ -100,6 +101,33 @@ test("an object moves by waypoints of its own: dropped, drawn, flown and saved",
     return [objects[0].poses[0], objects[0].poses.at(-1)];
   }, read("moving.yaml"));
   assert.ok(Math.hypot(...from.slice(0, 3).map((value, i) => value - to[i])) > 0.2, "the simulator flies it too");
+});
+
+test("a person walks along the time line, and back", async () => {
+  write(
+    "walking.yaml",
+    `${room}  lighting: {type: lambert, ambient: 0.4, suns: [{direction: [0.3, -0.6, -0.75], strength: 0.8}]}\n  objects:\n  - {name: walker, scene: walker.glb, trajectory: {type: static}, animation: {time_scale: 0.5}}\ntrajectory: {type: static, pose: {position: [-0.4, 1.3, 1.5], look_at: [0.3, -1, 1]}}\nduration_s: 3\n${camera}`,
+  );
+  const page = await design("walking.yaml");
+  await until(async () => / of /.test(await clock(page).textContent()), "the flight");
+  const plot = page.locator(".timeline .plot");
+  const at = async (key) => {
+    const shapes = page.waitForResponse((answer) => answer.url().includes(".shapes?"), { timeout: 15_000 });
+    await plot.press(key);
+    return shapes;
+  };
+  assert.equal((await at("End")).status(), 200, "shapes arrive");
+  await page.waitForTimeout(1500);
+  const end = await pictureOf(page);
+  await shot(page, "walker-end");
+  await plot.press("Home");
+  await page.waitForTimeout(1500);
+  const start = await pictureOf(page);
+  await shot(page, "walker-start");
+  assert.ok((await differing(page, start, end)) > 0.01, "the person is elsewhere");
+  await plot.press("End");
+  const again = await pictureOf(page);
+  assert.ok((await differing(page, again, end)) < 0.001, "its shape is kept");
 });
 
 test("the flight of a file becomes waypoints, the selected one with its handles", async () => {

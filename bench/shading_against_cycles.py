@@ -4,7 +4,8 @@
 
 Prints a table: the rms of the difference over the sphere, in percent of the mean radiance that Cycles sees there. Cycles
 has the equations of glTF 2.0 as a mixture of its Diffuse and Glossy BSDFs. Its GGX has the separable visibility term of
-Smith, and glTF 2.0 the height-correlated one: "as it is" leaves that, "same term" corrects it with shader nodes. Needs
+Smith, and glTF 2.0 the height-correlated one: "as it is" leaves that, "same term" corrects it with shader nodes. A second table compares the light of
+an environment with the integral over its image. Needs
 NumPy, `blender`, and the program render_irradiance of the benchmarks.
 """
 
@@ -30,15 +31,22 @@ ROUGHNESSES = (0.1, 0.3, 0.5, 0.7, 1.0)
 
 
 def sphere(columns=512, rows=256):
-    """Vertices, which are also the normals, and triangles."""
-    latitude = np.linspace(-math.pi / 2, math.pi / 2, rows + 1)[:, None]
-    longitude = np.linspace(0, 2 * math.pi, columns + 1)[None, :]
-    vertices = np.stack(np.broadcast_arrays(np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude),
-                                            np.sin(latitude)), -1).reshape(-1, 3)
-    corner = (np.arange(rows)[:, None] * (columns + 1) + np.arange(columns)[None, :]).ravel()
-    above = corner + columns + 1
-    triangles = np.concatenate([np.stack([corner, corner + 1, above + 1], -1), np.stack([corner, above + 1, above], -1)])
-    return vertices, triangles
+    """Vertices, which are also the normals, and triangles, without seams. (Blender stores given normals with 16 bits;
+    those that it computes here are exact enough.)"""
+    latitude = (np.arange(1, rows) / rows - 0.5)[:, None] * math.pi
+    longitude = np.arange(columns)[None, :] * (2 * math.pi / columns)
+    rings = np.stack(np.broadcast_arrays(np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude),
+                                         np.sin(latitude)), -1).reshape(-1, 3)
+    vertices = np.concatenate([rings, [[0, 0, -1], [0, 0, 1]]])
+    here, beside = np.arange(columns), (np.arange(columns) + 1) % columns
+    triangles = [np.stack([np.full(columns, len(rings)), beside, here], -1)]
+    for row in range(rows - 2):
+        below, above = row * columns, (row + 1) * columns
+        triangles += [np.stack([below + here, below + beside, above + beside], -1),
+                      np.stack([below + here, above + beside, above + here], -1)]
+    last = (rows - 2) * columns
+    triangles.append(np.stack([last + here, last + beside, np.full(columns, len(rings) + 1)], -1))
+    return vertices, np.concatenate(triangles)
 
 
 def write_gltf(path, metallic, roughness):
@@ -61,7 +69,61 @@ def write_gltf(path, metallic, roughness):
                      "uri": "data:application/octet-stream;base64," + base64.b64encode(data + indices).decode()}]}))
 
 
+def write_sky(path, height=128):
+    """An equirectangular image: smooth, with a sun 9 degrees wide. Returns what the file holds, and its directions."""
+    latitude = (0.5 - (np.arange(height) + 0.5) / height)[:, None] * math.pi
+    longitude = (1 - (np.arange(2 * height) + 0.5) / height)[None, :] * math.pi
+    d = np.stack(np.broadcast_arrays(np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude),
+                                     np.sin(latitude)), -1)
+    sun = np.array(LAMP) / np.linalg.norm(LAMP)
+    light = 0.4 + 0.3 * d[..., 2] + 0.15 * d[..., 0] * d[..., 1] + 15 * np.exp(-(np.arccos(d @ sun) / 0.08) ** 2)
+    mantissa, exponent = np.frexp(light)
+    code = np.clip(np.floor(mantissa * 256), 0, 255)
+    pixels = np.stack([code, code, code, exponent + 128], -1).astype(np.uint8)
+    path.write_bytes(f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {2 * height}\n".encode() + pixels.tobytes())
+    return np.ldexp(code, exponent - 8), d, np.broadcast_to(np.cos(latitude), light.shape)
+
+
+def integral(sky, n, v, metallic, roughness):
+    """What a point with the normal n reflects to v, by the equations, summed over the pixels of the sky."""
+    light, l, weight = sky
+    n_l, n_v = np.maximum(l @ n, 0), n @ v
+    h = l + v
+    h /= np.maximum(np.linalg.norm(h, axis=-1), 1e-9)[..., None]
+    a2 = roughness ** 4
+    lobe = a2 / ((h @ n) ** 2 * (a2 - 1) + 1) ** 2 * 0.5 / np.maximum(
+        n_l * math.sqrt(a2 + (1 - a2) * n_v ** 2) + n_v * np.sqrt(a2 + (1 - a2) * n_l ** 2), 1e-9)
+    schlick = (1 - h @ v) ** 5
+    fresnel = 0.04 + 0.96 * schlick
+    value = (metallic * lobe * (BASE + (1 - BASE) * schlick)
+             + (1 - metallic) * (BASE * (1 - fresnel) + lobe * fresnel)) * n_l
+    return np.sum(light * value * weight) * (math.pi / light.shape[0]) ** 2 / math.pi
+
+
+def print_environment(program, folder):
+    print("| environment: material | roughness | rms | largest |\n|---|---|---|---|")
+    rows, columns = np.nonzero(on_sphere())
+    chosen = np.random.default_rng(1).choice(len(rows), 300, replace=False)
+    sky = write_sky(folder / "sky.hdr")
+    for metallic in (0, 1):
+        for roughness in ROUGHNESSES[1:]:
+            seen = seen_by_esim(program, folder, "environment", metallic, roughness)
+            pairs = []
+            for k in chosen:
+                bearing = np.array([columns[k] - (SIZE - 1) / 2, FOCAL, (SIZE - 1) / 2 - rows[k]])
+                bearing /= np.linalg.norm(bearing)
+                along = DISTANCE * bearing[1] - math.sqrt((DISTANCE * bearing[1]) ** 2 - DISTANCE ** 2 + 1)
+                n = along * bearing - [0, DISTANCE, 0]
+                pairs.append((seen[rows[k], columns[k]], integral(sky, n, -bearing, metallic, roughness)))
+            ours, true = np.transpose(pairs)
+            error = np.abs(ours - true) / np.mean(true) * 100
+            print(f"| {'metal' if metallic else 'dielectric'} | {roughness} | {np.sqrt(np.mean(error ** 2)):.1f} % | "
+                  f"{error.max():.1f} % |")
+
+
 def lighting(light):
+    if light == "environment":
+        return "{type: pbr, environment: {image: sky.hdr, visible: false}}"
     facing = [-v for v in LAMP]
     entry = {"sun": f"suns: [{{direction: {list(SUN)}, strength: {STRENGTH['sun']}}}]",
              "point": f"points: [{{position: {list(LAMP)}, strength: {STRENGTH['point']}}}]",
@@ -98,7 +160,7 @@ scene.render.threads_mode, scene.render.threads = "FIXED", 2
 scene.cycles.max_bounces = scene.cycles.diffuse_bounces = scene.cycles.glossy_bounces = 0
 scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
 scene.cycles.sample_clamp_direct = scene.cycles.sample_clamp_indirect = 0
-scene.cycles.blur_glossy = 0
+scene.cycles.blur_glossy = scene.cycles.light_sampling_threshold = 0
 scene.render.use_persistent_data = True
 scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
 scene.render.resolution_x = scene.render.resolution_y = job["size"]
@@ -122,8 +184,6 @@ mesh = bpy.data.meshes.new("sphere")
 data = np.load(job["sphere"])
 mesh.from_pydata(data["vertices"].tolist(), [], data["triangles"].tolist())
 for polygon in mesh.polygons: polygon.use_smooth = True
-mesh.use_auto_smooth = True
-mesh.normals_split_custom_set_from_vertices(data["vertices"].tolist())
 ball = bpy.data.objects.new("sphere", mesh)
 scene.collection.objects.link(ball)
 
@@ -149,7 +209,7 @@ def place(kind):
             lamp.energy = math.pi ** 2 * strength
     light.rotation_mode = "QUATERNION"
     light.rotation_quaternion = along.to_track_quat("-Z", "Y")
-    scene.cycles.samples = job["samples"] if kind == "area" else 1
+    scene.cycles.samples = job["samples"] if kind == "area" else 64
 
 def material(kind, metallic, roughness, same_term):
     made = bpy.data.materials.new("surface")
@@ -247,15 +307,20 @@ def on_sphere():
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=pathlib.Path, default=FOLDER / "build/release")
-    parser.add_argument("--lights", default="sun,point,area")
-    parser.add_argument("--samples", type=int, default=2048, help="of Cycles for the area light; others need one")
+    parser.add_argument("--lights", default="sun,point,area,environment")
+    parser.add_argument("--samples", type=int, default=2048, help="of Cycles for the area light")
     arguments = parser.parse_args()
+    lights = arguments.lights.split(",")
     cases = [{"light": light, "metallic": metallic, "roughness": roughness, "same_term": same_term}
-             for light in arguments.lights.split(",") for metallic in (0, 1) for roughness in ROUGHNESSES
+             for light in lights if light != "environment" for metallic in (0, 1) for roughness in ROUGHNESSES
              for same_term in (False, True)]
     seen = on_sphere()
     with tempfile.TemporaryDirectory() as name:
         folder = pathlib.Path(name)
+        if "environment" in lights:
+            print_environment(arguments.build / "bench/render_irradiance", folder)
+        if not cases:
+            return
         references = seen_by_cycles(folder, cases, arguments.samples)
         print("| light | material | roughness | as it is | same term | mean radiance, esim / Cycles |")
         print("|---|---|---|---|---|---|")

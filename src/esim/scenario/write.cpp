@@ -143,7 +143,11 @@ class ReferenceWriter {
   }
   template <typename T>
   static std::string default_of(const std::vector<T>&) {
-    return " a list of" + default_of(T{});
+    if constexpr (requires { T::Zero(); }) {
+      return " a list of" + default_of(T(T::Zero()));  // Eigen leaves a new vector uninitialised
+    } else {
+      return " a list of" + default_of(T{});
+    }
   }
   template <typename T>
   requires std::is_enum_v<T>

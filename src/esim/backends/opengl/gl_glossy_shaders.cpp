@@ -151,7 +151,8 @@ vec2 reflected() {
   }
   for (int i = 0; i < area_count; ++i) sum += reflection_of_area(s, areas[i]);
   if (has_environment) {
-    vec3 mirrored = world_from_view * reflect(-s.view, s.normal);
+    float alpha = sqrt(s.alpha2), lean = (1 - alpha) * (sqrt(1 - alpha) + alpha);
+    vec3 mirrored = world_from_view * mix(s.normal, reflect(-s.view, s.normal), lean);
     float level = s.roughness * 8;
     int finer = min(int(level), 7);
     float lobe = mix(value_of(maps[finer + 1], mirrored), value_of(maps[finer + 2], mirrored), level - float(finer));

@@ -155,7 +155,9 @@ class LightOnGlossySurfaces {
     for (std::size_t i = 0; i < K; ++i) {
       const Eigen::Vector3f n(surface.at.normal.x[i], surface.at.normal.y[i], surface.at.normal.z[i]);
       const Eigen::Vector3f v(surface.view.x[i], surface.view.y[i], surface.view.z[i]);
-      const Eigen::Vector3f normal = R * n, mirrored = R * (2 * n.dot(v) * n - v);
+      // A wide lobe leans towards the normal (Lagarde, de Rousiers, "Moving Frostbite to PBR", SIGGRAPH 2014 course).
+      const float alpha = std::sqrt(surface.alpha2[i]), smooth = 1 - alpha, lean = smooth * (std::sqrt(smooth) + alpha);
+      const Eigen::Vector3f normal = R * n, mirrored = R * (n + lean * (2 * n.dot(v) * n - v - n));
       const float diffuse = environment.diffuse(views[i], normal.x(), normal.y(), normal.z());
       const float lobe = environment.specular(views[i], mirrored.x(), mirrored.y(), mirrored.z(), surface.roughness[i]);
       add_surroundings(surface, i, diffuse, lobe, sum);

@@ -31,6 +31,10 @@ void GlReadBack::start(const GlTarget& target, const std::vector<Tile>& tiles, b
   glPixelStorei(GL_PACK_ALIGNMENT, 1);
   read(seen_.name(), GL_COLOR_ATTACHMENT0, GL_RGBA, GL_FLOAT, kSeenBytes, tiles);
   if (with_objects) read(which_.name(), GL_COLOR_ATTACHMENT1, GL_RED_INTEGER, GL_UNSIGNED_SHORT, kWhichBytes, tiles);
+  if (target.place != 0) {
+    place_.make_room(pixels * kSeenBytes);
+    read(place_.name(), GL_COLOR_ATTACHMENT2, GL_RGBA, GL_FLOAT, kSeenBytes, tiles);
+  }
   glBindBuffer(GL_PIXEL_PACK_BUFFER, 0);
   if (done_ != nullptr) glDeleteSync(done_);
   done_ = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
@@ -61,6 +65,16 @@ void GlReadBack::finish(Sample& sample) {
       std::copy_n(which, tile.width, sample.object.row(y) + tile.x);
   }
   which_.unmap();
+  if (sample.surface.empty()) return;
+
+  const auto* place = static_cast<const float*>(place_.map());
+  for (const Tile& tile : sample.tiles) {
+    for (int y = tile.y; y < tile.y + tile.height; ++y) {
+      for (int x = tile.x; x < tile.x + tile.width; ++x, place += 4)
+        sample.surface(x, y) = {static_cast<std::uint32_t>(std::max(place[0], 0.0F)), place[1], place[2]};
+    }
+  }
+  place_.unmap();
 }
 
 }  // namespace esim::inline backends::inline opengl

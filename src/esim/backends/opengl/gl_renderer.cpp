@@ -66,6 +66,7 @@ class GlRenderer final : public Renderer {
     require_size();
     samples_ = offered_samples(options.samples_per_pixel);
     scene_.emplace(scene);
+    if (deforms()) rays_ = rays;
     if (lighting_ && lighting_->shadows) shadows_.emplace(scene, *scene_);
     if (lighting_ && lighting_->glossy) gloss_.emplace(*lighting_, *scene_);
     make_passes();
@@ -77,8 +78,11 @@ class GlRenderer final : public Renderer {
   }
 
   RendererTraits traits() const override {
-    return {
-        .name = "mesh", .granularity = Granularity::tile, .at_infinity = false, .device = "OpenGL, " + context_.name()};
+    return {.name = "mesh",
+            .granularity = Granularity::tile,
+            .at_infinity = false,
+            .device = "OpenGL, " + context_.name(),
+            .deforms = deforms()};
   }
 
   std::unique_ptr<Rendering> start(RenderRequest request) override {
@@ -86,10 +90,11 @@ class GlRenderer final : public Renderer {
       throw InternalError("the number of objects in a request must be the number of moving objects in the scene");
     const GlContext::Use use(context_);
     set_up(request);
+    GlDeformed deformed = scene_->deform(request.t);
     if (shadows_) shadows_->draw(request);
     draw_surfaces(request);
     for (const Tile& tile : request.tiles) complete(tile);
-    auto under_way = std::make_unique<UnderWay>(*this, std::move(request));
+    auto under_way = std::make_unique<UnderWay>(*this, std::move(request), std::move(deformed));
     under_way->read_back->start(view_.looked_up ? distorted_ : resolved_, under_way->request.tiles,
                                 under_way->request.wants_objects());
     throw_on_gl_error("rendering");
@@ -99,7 +104,8 @@ class GlRenderer final : public Renderer {
  private:
   /// A frame that the device renders. Borrows buffers from the renderer.
   struct UnderWay final : Rendering {
-    UnderWay(GlRenderer& from, RenderRequest asked) : renderer(from), request(std::move(asked)) {
+    UnderWay(GlRenderer& from, RenderRequest asked, GlDeformed objects)
+        : renderer(from), request(std::move(asked)), deformed(std::move(objects)) {
       if (renderer.idle_.empty()) renderer.idle_.push_back(std::make_unique<GlReadBack>());
       read_back = std::move(renderer.idle_.back());
       renderer.idle_.pop_back();
@@ -109,16 +115,21 @@ class GlRenderer final : public Renderer {
     UnderWay& operator=(const UnderWay&) = delete;
 
     void finish(Sample& sample) override {
-      prepare({&request, 1}, renderer.camera_.width, renderer.camera_.height, sample);
+      prepare({&request, 1}, renderer.camera_.width, renderer.camera_.height, sample, renderer.deforms());
       const GlContext::Use use(renderer.context_);
       read_back->finish(sample);
       throw_on_gl_error("reading an image back");
+      if (!deformed.empty())
+        complete_deforming(renderer.scene_->deforming(), deformed, request, *renderer.rays_, sample);
     }
 
     GlRenderer& renderer;
     RenderRequest request;
+    GlDeformed deformed;
     std::unique_ptr<GlReadBack> read_back;
   };
+
+  bool deforms() const { return !scene_->deforming().empty(); }
 
   std::size_t moving_count() const {
     const auto& objects = scene_->objects();
@@ -140,17 +151,21 @@ class GlRenderer final : public Renderer {
     ShaderSource surfaces = {kMeanShader, kSurfaceFragmentShader}, resolve = {kResolveFragmentShader};
     if (shadows_) surfaces.insert(surfaces.begin(), kShadowShader);
     if (gloss_) surfaces.insert(surfaces.begin(), kGlossyDefinition), surfaces.push_back(kGlossyShader);
-    surface_program_ = make_program({kSurfaceVertexShader}, surfaces);
-    surfaces_ = GlTarget::make(view_.width, view_.height, samples_, true, floats);
+    ShaderSource vertices = {kSurfaceVertexShader}, distort = {kLastPassShader, kDistortFragmentShader};
+    if (deforms()) {
+      for (ShaderSource* source : {&vertices, &surfaces, &resolve, &distort}) source->insert(source->begin(), kDeforms);
+    }
+    surface_program_ = make_program(vertices, surfaces);
+    surfaces_ = GlTarget::make(view_.width, view_.height, samples_, true, floats, deforms());
     if (resolves()) {
       if (!view_.looked_up) resolve.insert(resolve.begin(), kLastPassShader);
       if (samples_ > 1) resolve.insert(resolve.begin(), kSeveralSamples);
       resolve_program_ = make_program({kWholeImageVertexShader}, resolve);
-      resolved_ = GlTarget::make(view_.width, view_.height, 1, false, GL_RGBA32F);
+      resolved_ = GlTarget::make(view_.width, view_.height, 1, false, GL_RGBA32F, deforms());
     }
     if (view_.looked_up) {
-      distort_program_ = make_program({kWholeImageVertexShader}, {kLastPassShader, kDistortFragmentShader});
-      distorted_ = GlTarget::make(camera_.width, camera_.height, 1, false, GL_RGBA32F);
+      distort_program_ = make_program({kWholeImageVertexShader}, distort);
+      distorted_ = GlTarget::make(camera_.width, camera_.height, 1, false, GL_RGBA32F, deforms());
     }
   }
   bool resolves() const { return samples_ > 1 || !view_.looked_up; }
@@ -230,6 +245,7 @@ class GlRenderer final : public Renderer {
       begin_pass(resolved_, view_.part_for(tile), resolve_program_);
       glBindTextureUnit(kSeen, surfaces_.seen);
       glBindTextureUnit(kWhich, surfaces_.which);
+      if (deforms()) glBindTextureUnit(kPoints, surfaces_.place);
       set(resolve_program_, "samples", samples_);
       const auto f = [](double value) { return static_cast<float>(value); };
       glUniform4f(location(resolve_program_, "pinhole"), f(camera_.fx), f(camera_.fy), f(camera_.cx), f(camera_.cy));
@@ -240,6 +256,7 @@ class GlRenderer final : public Renderer {
     begin_pass(distorted_, tile, distort_program_);
     glBindTextureUnit(kSeen, shown->seen);
     glBindTextureUnit(kWhich, shown->which);
+    if (deforms()) glBindTextureUnit(kPoints, shown->place);
     glBindTextureUnit(kCentres, centres_);
     glBindTextureUnit(kFootprints, footprints_);
     glBindTextureUnit(kBearings, bearings_);
@@ -267,7 +284,10 @@ class GlRenderer final : public Renderer {
       const Eigen::Matrix4f matrix = pose.matrix().cast<float>();
       glUniformMatrix4fv(location(program, "camera_from_object"), 1, GL_FALSE, matrix.data());
       glUniform1ui(location(program, "object"), object.moves ? static_cast<GLuint>(++moving) : 0U);
-      for (const GlScene::Part& surface : object.parts) draw_part(surface);
+      for (const GlScene::Part& surface : object.parts) {
+        if (deforms()) set(program, "first_triangle", object.before(surface) / 3);
+        draw_part(surface);
+      }
     }
     glDisable(GL_DEPTH_TEST);
     glDisable(GL_STENCIL_TEST);
@@ -327,6 +347,7 @@ class GlRenderer final : public Renderer {
   std::array<float, 4> clip_{};
   int samples_ = 1;
   std::optional<GlScene> scene_;
+  std::optional<PixelRays> rays_;  // if objects deform
   std::optional<GlShadows> shadows_;
   std::optional<GlGloss> gloss_;
   GlTarget surfaces_, resolved_, distorted_;

@@ -12,26 +12,22 @@
 
 namespace esim::inline backends::inline opengl {
 
-/// Vertices are not shared, since texture coordinates belong to a triangle's corner.
-struct GlScene::Vertex {
-  Eigen::Vector3f position, normal;  // a normal of zero means a flat triangle
-  Eigen::Vector2f texture_uv;
-};
-
 GlScene::GlScene(const Scene& scene) {
-  std::vector<Vertex> vertices;
+  std::vector<GlVertex> vertices;
   for (const SceneObject& object : scene.objects) add(object, vertices);
   upload(vertices);
   throw_on_gl_error("uploading the scene");
 }
 
-void GlScene::add(const SceneObject& object, std::vector<Vertex>& vertices) {
+void GlScene::add(const SceneObject& object, std::vector<GlVertex>& vertices) {
   const Mesh& mesh = object.mesh;
   std::vector<std::uint32_t> order(mesh.triangles.size());
   std::iota(order.begin(), order.end(), 0U);
   std::stable_sort(order.begin(), order.end(), [&](auto a, auto b) { return mesh.material[a] < mesh.material[b]; });
 
+  const std::size_t first = vertices.size();
   Object added{object.moves, {}};
+  if (object.moves) ++moving_;
   for (std::size_t i = 0; i < order.size(); ++i) {
     const std::uint32_t triangle = order[i], material_index = mesh.material[triangle];
     if (i == 0 || material_index != mesh.material[order[i - 1]]) {
@@ -49,22 +45,34 @@ void GlScene::add(const SceneObject& object, std::vector<Vertex>& vertices) {
     added.parts.back().count += 3;
   }
   objects_.push_back(std::move(added));
+  if (object.deformation == nullptr) return;
+  std::vector<GlVertex> own(vertices.begin() + static_cast<std::ptrdiff_t>(first), vertices.end());
+  deforming_.emplace_back(object, std::move(order), first, std::move(own), moving_);
 }
 
-void GlScene::upload(const std::vector<Vertex>& vertices) {
-  GLuint buffer = 0;
-  glCreateBuffers(1, &buffer);
-  glNamedBufferStorage(buffer, static_cast<GLsizeiptr>(vertices.size() * sizeof(Vertex)), vertices.data(), 0);
+GlDeformed GlScene::deform(TimeNs t) {
+  GlDeformed deformed;
+  for (GlDeformingObject& object : deforming_) {
+    object.deform(t, buffer_);
+    deformed.push_back(object.vertices());
+  }
+  return deformed;
+}
+
+void GlScene::upload(const std::vector<GlVertex>& vertices) {
+  glCreateBuffers(1, &buffer_);
+  glNamedBufferStorage(buffer_, static_cast<GLsizeiptr>(vertices.size() * sizeof(GlVertex)), vertices.data(),
+                       deforming_.empty() ? 0 : GL_DYNAMIC_STORAGE_BIT);
   glCreateVertexArrays(1, &vertex_array_);
-  glVertexArrayVertexBuffer(vertex_array_, 0, buffer, 0, sizeof(Vertex));
+  glVertexArrayVertexBuffer(vertex_array_, 0, buffer_, 0, sizeof(GlVertex));
   const auto attribute = [&](GLuint name, GLint size, std::size_t offset) {
     glEnableVertexArrayAttrib(vertex_array_, name);
     glVertexArrayAttribFormat(vertex_array_, name, size, GL_FLOAT, GL_FALSE, static_cast<GLuint>(offset));
     glVertexArrayAttribBinding(vertex_array_, name, 0);
   };
-  attribute(kPosition, 3, offsetof(Vertex, position));
-  attribute(kNormal, 3, offsetof(Vertex, normal));
-  attribute(kTextureUv, 2, offsetof(Vertex, texture_uv));
+  attribute(kPosition, 3, offsetof(GlVertex, position));
+  attribute(kNormal, 3, offsetof(GlVertex, normal));
+  attribute(kTextureUv, 2, offsetof(GlVertex, texture_uv));
 }
 
 std::array<GLuint, 5> GlScene::gloss_textures(const Gloss* gloss) {

@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "esim/backends/opengl/gl_deforming.h"
 #include "esim/scene/scene.h"
 
 // Private to backends/opengl: includes epoxy/gl.h.
@@ -30,23 +31,33 @@ class GlScene {
   struct Object {
     bool moves;
     std::vector<Part> parts;
+
+    /// The number of its vertices before a part.
+    GLint before(const Part& part) const { return part.first - parts.front().first; }
   };
 
   const std::vector<Object>& objects() const { return objects_; }
   GLuint vertices() const { return vertex_array_; }
 
+  /// Those that deform.
+  const std::vector<GlDeformingObject>& deforming() const { return deforming_; }
+
+  /// Deforms the objects, and returns their vertices in the order of deforming().
+  GlDeformed deform(TimeNs t);
+
   /// A texture of the scene, or another one that lives as long. 0 for null.
   GLuint texture(const Texture* texture);
 
  private:
-  struct Vertex;
-  void add(const SceneObject& object, std::vector<Vertex>& vertices);
-  void upload(const std::vector<Vertex>& vertices);
+  void add(const SceneObject& object, std::vector<GlVertex>& vertices);
+  void upload(const std::vector<GlVertex>& vertices);
   std::array<GLuint, 5> gloss_textures(const Gloss* gloss);
 
   std::vector<Object> objects_;
+  std::size_t moving_ = 0;
+  std::vector<GlDeformingObject> deforming_;
   std::map<const Texture*, GLuint> textures_;
-  GLuint vertex_array_ = 0;
+  GLuint buffer_ = 0, vertex_array_ = 0;
 };
 
 }  // namespace esim::inline backends::inline opengl

@@ -3,6 +3,7 @@
 namespace esim::inline backends::inline opengl {
 
 const char* const kSeveralSamples = "#define SEVERAL_SAMPLES\n";
+const char* const kDeforms = "#define DEFORMS\n";
 
 // The motion field of render/motion_field.h, of one pixel.
 const char* const kLastPassShader = R"(
@@ -32,7 +33,14 @@ uniform float near;
 out vec3 point;  // in the camera frame
 out vec3 surface_normal;
 out vec2 uv;
+#ifdef DEFORMS
+out vec2 barycentric;
+#endif
 void main() {
+#ifdef DEFORMS
+  int corner = gl_VertexID % 3;
+  barycentric = vec2(corner == 1, corner == 2);
+#endif
   point = (camera_from_object * vec4(position, 1)).xyz;
   surface_normal = mat3(camera_from_object) * normal;
   uv = texture_uv;
@@ -85,6 +93,11 @@ uniform int light_count;
 uniform uint object;
 layout(location = 0) out vec4 seen;
 layout(location = 1) out uint which;
+#ifdef DEFORMS
+in vec2 barycentric;
+uniform int first_triangle;  // of what is drawn, in the object
+layout(location = 2) out vec4 place;
+#endif
 
 float mean_colour(sampler2D image) { return mean_over(image, uv, dFdx(uv), dFdy(uv)); }
 
@@ -126,6 +139,9 @@ void main() {
   float w = gl_FragCoord.w;
   seen = vec4(colour, w, dFdx(w), dFdy(w));
   which = object;
+#ifdef DEFORMS
+  place = vec4(float(first_triangle + gl_PrimitiveID), barycentric, 0);
+#endif
 }
 )";
 
@@ -140,16 +156,28 @@ const char* const kResolveFragmentShader = R"(
 #ifdef SEVERAL_SAMPLES
 layout(binding = 0) uniform sampler2DMS seen_samples;
 layout(binding = 1) uniform usampler2DMS which_samples;
+#ifdef DEFORMS
+layout(binding = 6) uniform sampler2DMS place_samples;
+#endif
 #else
 layout(binding = 0) uniform sampler2D seen_samples;
 layout(binding = 1) uniform usampler2D which_samples;
+#ifdef DEFORMS
+layout(binding = 6) uniform sampler2D place_samples;
+#endif
 #endif
 uniform int samples;
 uniform vec4 pinhole;  // fx, fy, cx, cy, px
 layout(location = 0) out vec4 seen;
 layout(location = 1) out uint which;
+#ifdef DEFORMS
+layout(location = 2) out vec4 place;
+#endif
 void main() {
   ivec2 pixel = ivec2(gl_FragCoord.xy);
+#ifdef DEFORMS
+  place = texelFetch(place_samples, pixel, 0);
+#endif
   vec4 first = texelFetch(seen_samples, pixel, 0);
   for (int i = 1; i < samples; ++i) first.r += texelFetch(seen_samples, pixel, i).r;
   first.r /= float(samples);
@@ -174,6 +202,10 @@ layout(binding = 4) uniform sampler2D bearings;
 layout(binding = 5) uniform sampler2D jacobians;   // of the pixel by the bearing: du/dx, dv/dx, du/dy, dv/dy
 layout(location = 0) out vec4 seen;
 layout(location = 1) out uint which;
+#ifdef DEFORMS
+layout(binding = 6) uniform sampler2D pinhole_place;
+layout(location = 2) out vec4 place;
+#endif
 
 float irradiance(vec2 at) {
   ivec2 corner = ivec2(floor(at));
@@ -196,6 +228,9 @@ void main() {
   float inverse_depth = max(there.g + dot(there.ba, centre - vec2(nearest)), 0);
   vec4 jacobian = texelFetch(jacobians, pixel, 0);
   which = texelFetch(pinhole_which, nearest, 0).r;
+#ifdef DEFORMS
+  place = texelFetch(pinhole_place, nearest, 0);
+#endif
   seen = last_pass(0.25 * sum, inverse_depth, which, texelFetch(bearings, pixel, 0).rg,
                    mat2(jacobian.xy, jacobian.zw));
 }

@@ -12,7 +12,8 @@ inline constexpr GLuint kLightsBinding = 0, kTwistsBinding = 1, kShadowViewsBind
                         kSurroundingsBinding = 4;
 inline constexpr GLuint kBaseTexture = 0, kEmissionTexture = 1, kStillShadows = 2, kMovingShadows = 3;
 inline constexpr GLuint kGlossTextures = 4, kSkyTexture = 9;  // five, in the order of GlScene::Part; one
-inline constexpr GLuint kSeen = 0, kWhich = 1, kCentres = 2, kFootprints = 3, kBearings = 4, kJacobians = 5;
+inline constexpr GLuint kSeen = 0, kWhich = 1, kCentres = 2, kFootprints = 3, kBearings = 4, kJacobians = 5,
+                        kPoints = 6;
 
 /// Precedes the shader of the last pass, which writes E, Z and V. The other passes write E, 1 / Z and its slopes to the
 /// right and downwards.
@@ -20,6 +21,10 @@ extern const char* const kLastPassShader;
 
 /// Precedes kResolveFragmentShader if pixels have more than one sample.
 extern const char* const kSeveralSamples;
+
+/// Precedes all shaders of surfaces, resolving and distorting if objects deform: then these also write the point of a
+/// surface, as the number of its triangle in the object and two barycentric coordinates.
+extern const char* const kDeforms;
 
 /// Precedes the fragment shader of surfaces if lights cast shadows.
 extern const char* const kShadowShader;

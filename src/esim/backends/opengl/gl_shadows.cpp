@@ -208,6 +208,16 @@ void GlShadows::draw_views(const Maps& maps, const std::vector<Placed>& objects)
   glDisable(GL_DEPTH_TEST);
 }
 
+/// The ball of a moving object, in its frame.
+GlShadows::Ball GlShadows::ball_of(std::size_t moving, TimeNs t) const {
+  for (const GlDeformingObject& object : drawn_.deforming()) {
+    if (object.number() != moving + 1) continue;
+    const auto [centre, radius] = object.ball(t);
+    return {centre.cast<double>(), double{radius}};
+  }
+  return balls_[moving];
+}
+
 void GlShadows::draw(const RenderRequest& request) {
   T_world_camera_ = request.camera.T_world_body;
   moving_.views.clear();
@@ -217,7 +227,7 @@ void GlShadows::draw(const RenderRequest& request) {
     for (const GlScene::Object& object : drawn_.objects()) {
       if (!object.moves) continue;
       const SE3& pose = request.objects[balls.size()].T_world_body;
-      const Ball& ball = balls_[balls.size()];
+      const Ball ball = ball_of(balls.size(), request.t);
       balls.push_back({pose * ball.centre, ball.radius});
       objects.push_back({&object, pose.matrix()});
     }

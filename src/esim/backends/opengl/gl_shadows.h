@@ -51,6 +51,7 @@ class GlShadows {
   };
 
   Maps make_maps(double max_texels) const;
+  Ball ball_of(std::size_t moving, TimeNs t) const;
   void draw_views(const Maps& maps, const std::vector<Placed>& objects) const;
   void view_points(Maps& maps) const;
   View still_sun(const Scene& scene, const SunLight& sun) const;
@@ -60,7 +61,7 @@ class GlShadows {
   const GlScene& drawn_;
   Lighting lighting_;
   int layers_ = 0;
-  std::vector<Ball> balls_;  // of the moving objects, in their frames
+  std::vector<Ball> balls_;  // of the moving objects, in their frames, before they deform
   Maps still_, moving_;
   GLuint framebuffer_ = 0, program_ = 0, views_ = 0;
   SE3 T_world_camera_;

@@ -25,7 +25,7 @@ GLuint make_texture(GLenum format, int width, int height, int samples) {
 
 }  // namespace
 
-GlTarget GlTarget::make(int width, int height, int samples, bool with_depth, GLenum floats) {
+GlTarget GlTarget::make(int width, int height, int samples, bool with_depth, GLenum floats, bool deforms) {
   GlTarget target;
   target.width = width, target.height = height;
   target.seen = make_texture(floats, width, height, samples);
@@ -37,8 +37,12 @@ GlTarget GlTarget::make(int width, int height, int samples, bool with_depth, GLe
     const GLuint depth = make_texture(GL_DEPTH32F_STENCIL8, width, height, samples);
     glNamedFramebufferTexture(target.framebuffer, GL_DEPTH_STENCIL_ATTACHMENT, depth, 0);
   }
-  constexpr GLenum kBuffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1};
-  glNamedFramebufferDrawBuffers(target.framebuffer, 2, kBuffers);
+  if (deforms) {
+    target.place = make_texture(GL_RGBA32F, width, height, samples);
+    glNamedFramebufferTexture(target.framebuffer, GL_COLOR_ATTACHMENT2, target.place, 0);
+  }
+  constexpr GLenum kBuffers[] = {GL_COLOR_ATTACHMENT0, GL_COLOR_ATTACHMENT1, GL_COLOR_ATTACHMENT2};
+  glNamedFramebufferDrawBuffers(target.framebuffer, deforms ? 3 : 2, kBuffers);
   throw_on_gl_error("allocating images");
   if (glCheckNamedFramebufferStatus(target.framebuffer, GL_FRAMEBUFFER) != GL_FRAMEBUFFER_COMPLETE)
     throw UserError("gl: the driver cannot render to floating-point images; use engine: raycast");

@@ -1,0 +1,62 @@
+#include "esim/backends/opengl/gl_deforming.h"
+
+#include <utility>
+
+#include "esim/render/motion_field.h"
+
+namespace esim::inline backends::inline opengl {
+
+GlDeformingObject::GlDeformingObject(const SceneObject& object, std::vector<std::uint32_t> order, std::size_t first,
+                                     std::vector<GlVertex> vertices, std::size_t number)
+    : deformation_(object.deformation),
+      triangles_(object.mesh.triangles),
+      order_(std::move(order)),
+      first_(first),
+      vertices_(std::move(vertices)),
+      number_(number) {}
+
+void GlDeformingObject::deform(TimeNs t, GLuint buffer) {
+  if (deformed_ != nullptr && t == t_) return;
+  auto deformed = std::make_shared<DeformedVertices>();
+  deformation_->evaluate(t, *deformed);
+  for (std::size_t i = 0; i < vertices_.size(); ++i) {
+    const std::uint32_t vertex = triangles_[order_[i / 3]][i % 3];
+    vertices_[i].position = deformed->positions[vertex];
+    if (!deformed->normals.empty()) vertices_[i].normal = deformed->normals[vertex];
+  }
+  glNamedBufferSubData(buffer, static_cast<GLintptr>(first_ * sizeof(GlVertex)),
+                       static_cast<GLsizeiptr>(vertices_.size() * sizeof(GlVertex)), vertices_.data());
+  t_ = t, deformed_ = std::move(deformed);
+}
+
+std::pair<Eigen::Vector3f, float> GlDeformingObject::ball(TimeNs t) const {
+  const Eigen::AlignedBox3f box = deformation_->bounds(t);
+  return {box.center(), 0.5F * box.diagonal().norm()};
+}
+
+Eigen::Vector3f GlDeformingObject::take(SurfacePoint& point, const DeformedVertices& vertices) const {
+  point.triangle = order_[point.triangle];
+  const auto& [a, b, c] = triangles_[point.triangle];
+  const std::vector<Eigen::Vector3f>& v = vertices.velocities;
+  return v[a] + point.b1 * (v[b] - v[a]) + point.b2 * (v[c] - v[a]);
+}
+
+void complete_deforming(const std::vector<GlDeformingObject>& objects, const GlDeformed& deformed,
+                        const RenderRequest& request, const PixelRays& rays, Sample& sample) {
+  const Eigen::Quaterniond R_camera_world = request.camera.T_world_body.rotation.conjugate();
+  for (std::size_t i = 0; i < objects.size(); ++i) {
+    const Eigen::Quaterniond& R_world_object = request.objects[objects[i].number() - 1].T_world_body.rotation;
+    const Eigen::Matrix3f R_camera_object = (R_camera_world * R_world_object).toRotationMatrix().cast<float>();
+    for (const Tile& tile : request.tiles) {
+      for (int y = tile.y; y < tile.y + tile.height; ++y) {
+        for (int x = tile.x; x < tile.x + tile.width; ++x) {
+          if (sample.object(x, y) != objects[i].number()) continue;
+          const Eigen::Vector3f velocity = objects[i].take(sample.surface(x, y), *deformed[i]);
+          add_to_motion_field(rays, x, y, R_camera_object * velocity, sample);
+        }
+      }
+    }
+  }
+}
+
+}  // namespace esim::inline backends::inline opengl

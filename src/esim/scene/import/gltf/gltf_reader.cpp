@@ -149,12 +149,12 @@ class GltfReader {
     material.metallic = material.roughness = 1;
     if (const Json* const pbr = GltfDocument::find(json, "pbrMetallicRoughness")) {
       material.metallic = number(*pbr, "metallicFactor", 1), material.roughness = number(*pbr, "roughnessFactor", 1);
-      const TextureSlot both = texture_slot(*pbr, "metallicRoughnessTexture");
+      const TextureSlot both = texture_slot(*pbr, "metallicRoughnessTexture", material.name);
       material.metallic_texture = material.roughness_texture = both.texture;
       share_coordinates("roughness", both, material.name, first);
     }
     if (const Json* const normal = GltfDocument::find(json, "normalTexture")) {
-      const TextureSlot slot = texture_slot(json, "normalTexture");
+      const TextureSlot slot = texture_slot(json, "normalTexture", material.name);
       material.normal_texture = slot.texture, material.normal_scale = number(*normal, "scale", 1);
       share_coordinates("normal", slot, material.name, first);
       ++graph_.relief;

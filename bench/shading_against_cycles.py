@@ -162,7 +162,7 @@ scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
 scene.cycles.sample_clamp_direct = scene.cycles.sample_clamp_indirect = 0
 scene.cycles.blur_glossy = scene.cycles.light_sampling_threshold = 0
 scene.render.use_persistent_data = True
-scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
+scene.cycles.pixel_filter_type, scene.cycles.filter_width = "GAUSSIAN", 0.01  # a box is always 1 px wide
 scene.render.resolution_x = scene.render.resolution_y = job["size"]
 scene.render.resolution_percentage = 100
 scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
@@ -209,7 +209,7 @@ def place(kind):
             lamp.energy = math.pi ** 2 * strength
     light.rotation_mode = "QUATERNION"
     light.rotation_quaternion = along.to_track_quat("-Z", "Y")
-    scene.cycles.samples = job["samples"] if kind == "area" else 64
+    scene.cycles.samples = job["samples"] if kind == "area" else 16
 
 def material(kind, metallic, roughness, same_term):
     made = bpy.data.materials.new("surface")

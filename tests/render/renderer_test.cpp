@@ -171,8 +171,8 @@ TEST_P(EveryRenderer, SaysWhichObjectEachPixelSeesWhereAsked) {
   // Splats reach beyond corners, and a pixel beyond outlines.
   const bool of_engine = name_ == "moving_unrealcv", is_gl = name_ == "moving_gl" || name_ == "moving_glossy_gl";
   const double tolerance = of_engine || (is_gl && std::get<1>(GetParam()) > 0) ? 0.2
-                           : name_.starts_with("moving_splats")                               ? 0.06
-                                                                                              : 0.01;
+                           : name_.starts_with("moving_splats")                ? 0.06
+                                                                               : 0.01;
   int astray = 0;
   std::vector<int> count(3);
   for (int y = 0; y < model_.height; ++y) {

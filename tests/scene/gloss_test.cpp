@@ -93,14 +93,14 @@ TEST_F(GlossFiles, TexturesAreNumbersNotColours) {
 }
 
 TEST_F(GlossFiles, WhatIsMissingOrOutOfRangeIsNamed) {
-  const Gloss gloss = *load_material({{"name", "paint"},
-                                      {"pbrMetallicRoughness",
-                                       {{"metallicFactor", -0.5},
-                                        {"roughnessFactor", 1.5},
-                                        {"metallicRoughnessTexture", {{"index", 2}}}}},
-                                      {"normalTexture", {{"index", 2}}}})
-                           .materials.at(0)
-                           .gloss;
+  const Gloss gloss =
+      *load_material(
+           {{"name", "paint"},
+            {"pbrMetallicRoughness",
+             {{"metallicFactor", -0.5}, {"roughnessFactor", 1.5}, {"metallicRoughnessTexture", {{"index", 2}}}}},
+            {"normalTexture", {{"index", 2}}}})
+           .materials.at(0)
+           .gloss;
   EXPECT_EQ(gloss.metallic, 0);
   EXPECT_EQ(gloss.roughness, 1);
   EXPECT_EQ(gloss.roughness_texture, nullptr);

@@ -28,7 +28,7 @@ AREA = (1.0, 0.8)  # m; it faces the sphere
 STRENGTH = {"sun": 0.8, "point": 4.0, "area": 4.0}
 AREA_SAMPLES = 1024
 ROUGHNESSES = (0.1, 0.3, 0.5, 0.7, 1.0)
-COLUMNS = 512  # of the sphere; for roughness 0.1, the normals that Blender computes are exact enough from 1024 on
+COLUMNS = 512  # of the sphere
 
 
 def sphere():

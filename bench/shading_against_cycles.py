@@ -208,7 +208,7 @@ def place(kind):
             lamp.shadow_soft_size, lamp.energy = 0, 4 * math.pi ** 2 * strength
         else:
             lamp.shape, lamp.size, lamp.size_y = "RECTANGLE", *job["area"]
-            lamp.energy = math.pi ** 2 * strength
+            lamp.energy = 4 * math.pi * strength  # of a radiance of energy / (4 area)
     light.rotation_mode = "QUATERNION"
     light.rotation_quaternion = along.to_track_quat("-Z", "Y")
     scene.cycles.samples = job["samples"] if kind == "area" else 16

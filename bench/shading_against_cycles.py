@@ -28,11 +28,13 @@ AREA = (1.0, 0.8)  # m; it faces the sphere
 STRENGTH = {"sun": 0.8, "point": 4.0, "area": 4.0}
 AREA_SAMPLES = 1024
 ROUGHNESSES = (0.1, 0.3, 0.5, 0.7, 1.0)
+COLUMNS = 512  # of the sphere
 
 
-def sphere(columns=512, rows=256):
+def sphere():
     """Vertices, which are also the normals, and triangles, without seams. (Blender stores given normals with 16 bits;
-    those that it computes here are exact enough.)"""
+    those that it computes here are more exact.)"""
+    columns, rows = COLUMNS, COLUMNS // 2
     latitude = (np.arange(1, rows) / rows - 0.5)[:, None] * math.pi
     longitude = np.arange(columns)[None, :] * (2 * math.pi / columns)
     rings = np.stack(np.broadcast_arrays(np.cos(latitude) * np.cos(longitude), np.cos(latitude) * np.sin(longitude),
@@ -162,7 +164,7 @@ scene.cycles.use_denoising = scene.cycles.use_adaptive_sampling = False
 scene.cycles.sample_clamp_direct = scene.cycles.sample_clamp_indirect = 0
 scene.cycles.blur_glossy = scene.cycles.light_sampling_threshold = 0
 scene.render.use_persistent_data = True
-scene.cycles.pixel_filter_type, scene.cycles.filter_width = "BOX", 0.01
+scene.cycles.pixel_filter_type, scene.cycles.filter_width = "GAUSSIAN", 0.01  # a box is always 1 px wide
 scene.render.resolution_x = scene.render.resolution_y = job["size"]
 scene.render.resolution_percentage = 100
 scene.render.image_settings.file_format, scene.render.image_settings.color_depth = "OPEN_EXR", "32"
@@ -206,10 +208,10 @@ def place(kind):
             lamp.shadow_soft_size, lamp.energy = 0, 4 * math.pi ** 2 * strength
         else:
             lamp.shape, lamp.size, lamp.size_y = "RECTANGLE", *job["area"]
-            lamp.energy = math.pi ** 2 * strength
+            lamp.energy = 4 * math.pi * strength  # of a radiance of energy / (4 area)
     light.rotation_mode = "QUATERNION"
     light.rotation_quaternion = along.to_track_quat("-Z", "Y")
-    scene.cycles.samples = job["samples"] if kind == "area" else 64
+    scene.cycles.samples = job["samples"] if kind == "area" else 16
 
 def material(kind, metallic, roughness, same_term):
     made = bpy.data.materials.new("surface")
@@ -305,14 +307,18 @@ def on_sphere():
 
 
 def main():
+    global COLUMNS
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--build", type=pathlib.Path, default=FOLDER / "build/release")
     parser.add_argument("--lights", default="sun,point,area,environment")
     parser.add_argument("--samples", type=int, default=2048, help="of Cycles for the area light")
+    parser.add_argument("--roughness", type=float, nargs="+", default=ROUGHNESSES)
+    parser.add_argument("--columns", type=int, default=COLUMNS)
     arguments = parser.parse_args()
+    COLUMNS = arguments.columns
     lights = arguments.lights.split(",")
     cases = [{"light": light, "metallic": metallic, "roughness": roughness, "same_term": same_term}
-             for light in lights if light != "environment" for metallic in (0, 1) for roughness in ROUGHNESSES
+             for light in lights if light != "environment" for metallic in (0, 1) for roughness in arguments.roughness
              for same_term in (False, True)]
     seen = on_sphere()
     with tempfile.TemporaryDirectory() as name:

@@ -121,6 +121,7 @@ TEST_P(EveryRenderer, EvaluatesTilesOfSeveralTimesTogether) {
 }
 
 TEST_P(EveryRenderer, BrightnessMovesWithTheMotionField) {
+  if (name_.find("glossy") != std::string::npos) GTEST_SKIP() << "highlights move over surfaces";
   // Brightness constancy, Eq. 1: dE/dt + <grad E, V> = 0 on a smooth texture. Ties E, Z and V together.
   const Sample sample = test::render(*renderer_, model_, camera_, objects_);
   constexpr double kStep = 2e-3;
@@ -180,10 +181,10 @@ TEST_P(EveryRenderer, SaysWhichObjectEachPixelSeesWhereAsked) {
 
   // If a pinhole image is looked up, edges are off by half a pixel, and sometimes the slope of the surface is wrong.
   // Splats reach beyond corners, and a pixel beyond outlines.
-  const bool of_engine = name_ == "moving_unrealcv";
-  const double tolerance = of_engine || (name_ == "moving_gl" && std::get<1>(GetParam()) > 0) ? 0.2
-                           : name_.starts_with("moving_splats")                               ? 0.06
-                                                                                              : 0.01;
+  const bool of_engine = name_ == "moving_unrealcv", is_gl = name_ == "moving_gl" || name_ == "moving_glossy_gl";
+  const double tolerance = of_engine || (is_gl && std::get<1>(GetParam()) > 0) ? 0.2
+                           : name_.starts_with("moving_splats")                ? 0.06
+                                                                               : 0.01;
   int astray = 0;
   std::vector<int> count(3);
   for (int y = 0; y < model_.height; ++y) {

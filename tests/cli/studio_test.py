@@ -311,6 +311,17 @@ class Answers(StudioTest):
             self.assertEqual(self.server.request("GET", f"{base}/{wrong}.shapes?first=0&count=1")[0], 404, wrong)
         self.assertEqual(self.server.request("GET", f"{shapes['file']}?first=0&count=1", token=False)[0], 401)
 
+    def test_surfaces_shine_with_pbr_only(self):
+        shutil.copy(SCENES / "walker/walker.glb", self.work)
+        for light, expected in (("pbr", 0.15), ("lambert", 1)):
+            yaml = f"renderer: {{type: mesh, scene: walker.glb, lighting: {{type: {light}}}}}\ntrajectory: {{type: static}}\nduration_s: 1\n"
+            scene = self.ask("POST", "/api/scene", {"yaml": yaml, "dir": "work"})
+            glb = self.server.request("GET", scene["glb"])[2]
+            document = json.loads(glb[20:20 + struct.unpack("<I", glb[12:16])[0]])
+            surfaces = {m["name"]: m["pbrMetallicRoughness"] for m in document["materials"]}
+            self.assertEqual({s["metallicFactor"] for s in surfaces.values()}, {0})
+            self.assertAlmostEqual(surfaces["glaze"]["roughnessFactor"], expected, places=6)
+
     def test_the_motion_is_the_simulators(self):
         motion = self.ask("POST", "/api/trajectory", self.scenario(samples=11))
         self.assertEqual(len(motion["poses"]), 11)

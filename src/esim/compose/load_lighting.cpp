@@ -146,9 +146,8 @@ bool shines(const Scene& scene) {
 
 }  // namespace
 
-SurfaceModel surface_model(const LightingOptions& options, SceneLook look) {
-  return std::holds_alternative<PbrOptions>(options) && look != SceneLook::coded ? SurfaceModel::glossy
-                                                                                 : SurfaceModel::matte;
+SurfaceModel surface_model(const LightingOptions& options) {
+  return std::holds_alternative<PbrOptions>(options) ? SurfaceModel::glossy : SurfaceModel::matte;
 }
 
 std::optional<Lighting> load_lighting(const LightingOptions& options, const Scene& scene, SceneLook look) {

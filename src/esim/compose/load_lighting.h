@@ -9,8 +9,8 @@
 // Private to compose.
 namespace esim::inline compose {
 
-/// What must be loaded of the scene's materials. With coded textures, which are for viewers, only what is matte.
-SurfaceModel surface_model(const LightingOptions& options, SceneLook look);
+/// What must be loaded of the scene's materials.
+SurfaceModel surface_model(const LightingOptions& options);
 
 /// The lights that a scenario describes; empty if surfaces are unlit. `scene` has all objects. Reads the image of an
 /// environment, except for viewers. Throws UserError, naming the option, for values out of range.

@@ -102,7 +102,7 @@ class ObjectLoader {
 /// Adds the objects that a scenario lists, and the light.
 void add_objects(const std::vector<ObjectOptions>& objects, const LightingOptions& lighting,
                  const SplatsRendererOptions* with_splats, SceneLook look, const Notices& notices, SceneFile& file) {
-  ObjectLoader loader(with_splats, look, surface_model(lighting, look), notices);
+  ObjectLoader loader(with_splats, look, surface_model(lighting), notices);
   for (std::size_t i = 0; i < objects.size(); ++i) {
     require_scene_path(objects[i].scene, fmt::format("objects.{}.scene", i));
     SceneObject loaded = loader.load(objects[i]);
@@ -120,7 +120,7 @@ void add_objects(const std::vector<ObjectOptions>& objects, const LightingOption
 SceneFile load(const MeshRendererOptions& options, SceneLook look, const Notices& notices) {
   require_scene_path(options.scene, "scene");
   SceneFile file =
-      load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting, look));
+      load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting));
   notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   add_objects(options.objects, options.lighting, nullptr, look, notices, file);
   return file;
@@ -132,8 +132,7 @@ SceneFile load(const SplatsRendererOptions& options, SceneLook look, const Notic
   if (is_splat_file(options.scene)) {
     file.scene.objects.push_back({"", {}, false, std::make_shared<const Splats>(upright_splats(options, notices))});
   } else {
-    file =
-        load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting, look));
+    file = load_scene_file(readable(options.scene, notices), notices.warning, look, surface_model(options.lighting));
     notices.note(fmt::format("scene {}: {}", options.scene.filename().string(), summary(file)));
   }
   add_objects(options.objects, options.lighting, &options, look, notices, file);

@@ -61,6 +61,7 @@ std::shared_ptr<const Gloss> GlossTextures::convert(const GraphMaterial& source)
   gloss.roughness = clamped("roughness", source.roughness, name, store_.warning());
   gloss.reflectance = clamped("reflectance", source.reflectance, name, store_.warning());
   gloss.edge_reflectance = clamped("specular factor", source.edge_reflectance, name, store_.warning());
+  if (store_.look() == SceneLook::coded) return std::make_shared<const Gloss>(std::move(gloss));
   gloss.roughness_texture =
       channel(source.roughness_texture, kGreen, name, fmt::format("its roughness is {} everywhere", gloss.roughness));
   gloss.metallic_texture = channel(source.metallic_texture, kBlue, name,

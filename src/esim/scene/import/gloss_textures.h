@@ -17,7 +17,8 @@ class GlossTextures {
  public:
   explicit GlossTextures(TextureStore& store) : store_(store) {}
 
-  /// A factor outside 0 to 1 is clamped, and a texture that cannot be read is left out, both after a warning.
+  /// A factor outside 0 to 1 is clamped, and a texture that cannot be read is left out, both after a warning. With
+  /// SceneLook::coded, only factors.
   std::shared_ptr<const Gloss> convert(const GraphMaterial& source);
 
  private:

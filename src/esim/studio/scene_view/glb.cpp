@@ -233,6 +233,10 @@ class Writer {
     Look base = base_of(channels), emission = emission_of(channels);
     if (unlit && is_dark(base)) std::swap(base, emission);
     Json surface{{"baseColorFactor", factor(base, 1)}, {"metallicFactor", 0}, {"roughnessFactor", 1}};
+    if (const auto& gloss = channels[0]->gloss) {
+      surface["metallicFactor"] = gloss->metallic;
+      surface["roughnessFactor"] = gloss->roughness;
+    }
     if (const auto texture = texture_of(base)) {
       surface["baseColorTexture"] = {{"index", *texture}};
     } else if (base.texture != nullptr) {

@@ -1,7 +1,7 @@
 // The renderer of splats against slow double-precision code: accuracy, events and time. Usage:
-//   measure_splats FILE [--inside] [--display|--linear] [--distance N]
+//   measure_splats FILE [--inside] [--display|--linear] [--distance N] [--rate HZ]
 // The camera looks along the file's z axis from N (2.5) times the scene's depth away or, with --inside, along its x
-// axis, with z up, from its middle.
+// axis, with z up, from its middle. Events are those of images at HZ (250), against those of slow code at 8 HZ.
 
 #include <fmt/format.h>
 
@@ -29,17 +29,20 @@ using Rules = test::SplatRules;
 struct Setting {
   std::shared_ptr<Splats> splats;
   bool inside = false;
+  double rate_hz = 250;
   SE3 start;  // of the camera in the scene
 };
 
 Setting set_up(int count, char** arguments) {
   Setting setting;
-  if (count < 2) throw UserError("usage: measure_splats FILE [--inside] [--display|--linear] [--distance N]");
+  if (count < 2)
+    throw UserError("usage: measure_splats FILE [--inside] [--display|--linear] [--distance N] [--rate HZ]");
   setting.splats = std::make_shared<Splats>(
       load_splats(arguments[1], [](const std::string& warning) { fmt::print(stderr, "{}\n", warning); }));
   double distance = 2.5;
   for (int i = 2; i < count; ++i) {
     if (std::strcmp(arguments[i], "--distance") == 0 && i + 1 < count) distance = std::atof(arguments[i + 1]);
+    if (std::strcmp(arguments[i], "--rate") == 0 && i + 1 < count) setting.rate_hz = std::atof(arguments[i + 1]);
     if (std::strcmp(arguments[i], "--inside") == 0) setting.inside = true;
     if (std::strcmp(arguments[i], "--linear") == 0) setting.splats->light = SplatLight::linear;
     if (std::strcmp(arguments[i], "--display") == 0) setting.splats->light = SplatLight::display;
@@ -95,8 +98,8 @@ double psnr(const Image<float>& a, const Image<float>& b) {
 
 void compare_images(const Setting& setting, const Workers& workers) {
   const Camera camera = Camera::from_fov(346, 260, 1.0);
-  fmt::print("\nPSNR, dB, of irradiance at 346 x 260:\n{:>6} {:>18} {:>18} {:>18} {:>18}\n", "view", "depth, published",
-             "unscented, publ.", "distance, its rule", "published, dist.");
+  fmt::print("\nPSNR, dB, of irradiance at 346 x 260:\n{:>6} {:>18} {:>18} {:>18} {:>18} {:>18}\n", "view",
+             "depth, published", "unscented, publ.", "distance, its rule", "ray, its rule", "published, dist.");
   for (int view = 0; view < 3; ++view) {
     const Kinematics pose = moved(setting, view);
     const auto render = [&](SplatOrder order, SplatProjection projection) {
@@ -109,11 +112,13 @@ void compare_images(const Setting& setting, const Workers& workers) {
     const auto slow = [&](const Rules& rules) {
       return luminance_of(*setting.splats, test::render_slowly(*setting.splats, camera, pose.T_world_body, rules));
     };
-    const Image<float> published = slow({Rules::Order::depth, false}), distance = slow({Rules::Order::distance, true});
-    fmt::print("{:>6} {:>18.1f} {:>18.1f} {:>18.1f} {:>18.1f}\n", view,
+    const Image<float> published = slow({Rules::Order::depth, false}), distance = slow({Rules::Order::distance, true}),
+                       ray = slow({Rules::Order::ray, true});
+    fmt::print("{:>6} {:>18.1f} {:>18.1f} {:>18.1f} {:>18.1f} {:>18.1f}\n", view,
                psnr(render(SplatOrder::depth, SplatProjection::linear), published),
                psnr(render(SplatOrder::depth, SplatProjection::unscented), published),
-               psnr(render(SplatOrder::distance, SplatProjection::linear), distance), psnr(published, distance));
+               psnr(render(SplatOrder::distance, SplatProjection::linear), distance),
+               psnr(render(SplatOrder::ray, SplatProjection::linear), ray), psnr(published, distance));
   }
 }
 
@@ -171,7 +176,8 @@ double variation(const std::vector<Brightness>& samples) {
 
 void compare_events(const Setting& setting, const Workers& workers) {
   constexpr int kSamples = 160, kDenser = 8, kWidth = 173, kHeight = 130;
-  constexpr double kInterval_s = 0.5e-3, kThreshold = 0.2;
+  constexpr double kThreshold = 0.2;
+  const double interval_s = 1 / (kDenser * setting.rate_hz);
   const Camera camera = Camera::from_fov(kWidth, kHeight, 1.0);
   const auto brightness = [](const Image<float>& irradiance) {
     Brightness values;
@@ -181,7 +187,7 @@ void compare_events(const Setting& setting, const Workers& workers) {
   const auto render_all_slowly = [&](Rules::Order order) {
     std::vector<Brightness> samples(kSamples + 1);
     workers.for_each(kSamples + 1, [&](int i) {
-      const SE3 pose = moved(setting, i * kInterval_s).T_world_body;
+      const SE3 pose = moved(setting, i * interval_s).T_world_body;
       samples[static_cast<std::size_t>(i)] =
           brightness(luminance_of(*setting.splats, test::render_slowly(*setting.splats, camera, pose, {order, true})));
     });
@@ -189,33 +195,46 @@ void compare_events(const Setting& setting, const Workers& workers) {
   };
   const std::vector<Brightness> slow = render_all_slowly(Rules::Order::distance),
                                 by_ray = render_all_slowly(Rules::Order::ray);
-  std::vector<Brightness> fast;
-  const auto renderer = make(setting, camera, {}, workers);
-  for (int i = 0; i <= kSamples; i += kDenser) {
-    Sample sample;
-    renderer->render({0, moved(setting, i * kInterval_s), {{0, 0, kWidth, kHeight}}}, sample);
-    fast.push_back(brightness(sample.irradiance));
-  }
-  const PixelEvents expected = events_of(slow, kInterval_s, kThreshold);
-  const PixelEvents found = events_of(fast, kInterval_s * kDenser, kThreshold);
+  const auto events_in = [&](SplatOrder order, int denser) {
+    SplatOptions options;
+    options.order = order;
+    const auto renderer = make(setting, camera, options, workers);
+    std::vector<Brightness> fast;
+    for (int i = 0; i <= kSamples; i += denser) {
+      Sample sample;
+      renderer->render({0, moved(setting, i * interval_s), {{0, 0, kWidth, kHeight}}}, sample);
+      fast.push_back(brightness(sample.irradiance));
+    }
+    return events_of(fast, interval_s * denser, kThreshold);
+  };
   fmt::print(
-      "\nevents at {} x {}, C = {}, sampled at {:g} Hz, against slow code at {:g} Hz: {:.2f} % are matched, "
-      "{:.2f} % of the true ones are found\n",
-      kWidth, kHeight, kThreshold, 1 / (kInterval_s * kDenser), 1 / kInterval_s, 100 * matched(found, expected),
-      100 * matched(expected, found));
-  const PixelEvents expected_by_ray = events_of(by_ray, kInterval_s, kThreshold);
-  fmt::print("against slow code that sorts by the mean depth in each pixel: {:.2f} % and {:.2f} %\n",
-             100 * matched(found, expected_by_ray), 100 * matched(expected_by_ray, found));
+      "\nevents at {} x {}, C = {}, sampled at {:g} Hz, against slow code at {:g} Hz: which share is matched, and "
+      "which "
+      "share of the true ones is found, %\n",
+      kWidth, kHeight, kThreshold, 1 / (interval_s * kDenser), 1 / interval_s);
+  const PixelEvents expected = events_of(slow, interval_s, kThreshold),
+                    expected_by_ray = events_of(by_ray, interval_s, kThreshold);
+  const auto compare = [](const char* what, const PixelEvents& found, const PixelEvents& truth) {
+    fmt::print("{}: {:.2f}, {:.2f}\n", what, 100 * matched(found, truth), 100 * matched(truth, found));
+  };
+  const PixelEvents found = events_in(SplatOrder::distance, kDenser);
+  compare("order: distance, against the same order", found, expected);
+  compare("order: distance, against the order by rays", found, expected_by_ray);
+  compare("order: ray, against the same order", events_in(SplatOrder::ray, kDenser), expected_by_ray);
+  compare("order: ray, sampled as often", events_in(SplatOrder::ray, 1), expected_by_ray);
   fmt::print("total variation of log E in the slow code: {:.0f} by distance, {:.0f} by the mean depth in each pixel\n",
              variation(slow), variation(by_ray));
 }
 
-void measure_time(const Setting& setting) {
+void measure_time(const Setting& setting, SplatOrder order) {
   const Camera camera = Camera::from_fov(346, 260, 1.0);
-  fmt::print("\ntime per image at 346 x 260, and per tile of 16 x 16 in its middle, ms:\n");
+  fmt::print("\ntime per image at 346 x 260 by {}, and per tile of 16 x 16 in its middle, ms:\n",
+             order == SplatOrder::ray ? "rays" : "distance");
+  SplatOptions options;
+  options.order = order;
   for (const int threads : {1, 2}) {
     const Workers workers(threads);
-    const auto renderer = make(setting, camera, {}, workers);
+    const auto renderer = make(setting, camera, options, workers);
     const auto time_of = [&](const Tile& tile, int repetitions) {
       Sample sample;
       renderer->render({0, moved(setting, 0), {tile}}, sample);
@@ -232,7 +251,8 @@ void measure_time(const Setting& setting) {
 int run(int count, char** arguments) {
   const Setting setting = set_up(count, arguments);
   const Workers workers(0);
-  measure_time(setting);
+  measure_time(setting, SplatOrder::distance);
+  measure_time(setting, SplatOrder::ray);
   compare_images(setting, workers);
   compare_events(setting, workers);
   return 0;

@@ -225,6 +225,9 @@ TEST_F(GlSplatsTest, ShowTheBackgroundWithoutSplats) {
 TEST_F(GlSplatsTest, SayWhatIsMissing) {
   const Camera model = test::distorted_camera(0);
   EXPECT_THROW(make_gl_splat_renderer({{random_splats({}, 12)}}, {}, model, 31), UserError);
+  SplatOptions by_ray;
+  by_ray.order = SplatOrder::ray;
+  EXPECT_THROW(make_gl_splat_renderer({{random_splats({}, 12)}}, by_ray, model, {}), UserError);
   const auto gl = make_gl_splat_renderer({{random_splats({}, 12)}}, {}, model, {});
   EXPECT_NE(gl->traits().label().find("OpenGL"), std::string::npos);
   EXPECT_EQ(gl->traits().granularity, Granularity::frame);

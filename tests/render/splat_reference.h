@@ -19,7 +19,7 @@ struct SplatRules {
   enum class Order {
     distance,  ///< of the centres
     depth,     ///< of the centres
-    ray,       ///< depth of the splat on the ray of each pixel
+    ray,  ///< of the splat on the ray of each pixel: its inverse depth, and 1/1024 of the centre's inverse distance
   };
   Order order = Order::ray;
   bool fades = true;  ///< splats fade out between opacities of 1.5/255 and 0.5/255; otherwise they end at 1/255
@@ -118,7 +118,7 @@ inline Image<SplatPixel> render_slowly(const Splats& splats, const Camera& camer
         if (alpha <= 0) continue;
         const double depth = std::clamp(1 / std::max(1e-9, 1 / mean.z() - slope.dot(d) / (mean.z() * mean.z())),
                                         std::max(mean.z() - thickness, 0.05 * mean.z()), mean.z() + thickness);
-        const double order = rules.order == SplatRules::Order::ray     ? depth
+        const double order = rules.order == SplatRules::Order::ray     ? 1 / (1 / depth + 1 / (1024 * mean.norm()))
                              : rules.order == SplatRules::Order::depth ? mean.z()
                                                                        : mean.norm();
         pixels[static_cast<std::size_t>(v * camera.width + u)].push_back(

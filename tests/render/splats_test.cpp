@@ -66,6 +66,11 @@ double luminance_of(const SplatPixel& pixel) {
   return 0.2126 * pixel.colour[0] + 0.7152 * pixel.colour[1] + 0.0722 * pixel.colour[2];
 }
 
+SplatRules::Order order_in_reference(SplatOrder order) {
+  if (order == SplatOrder::ray) return SplatRules::Order::ray;
+  return order == SplatOrder::depth ? SplatRules::Order::depth : SplatRules::Order::distance;
+}
+
 /// Largest difference between two images of irradiance.
 double largest_difference(const Sample& sample, const Image<SplatPixel>& expected) {
   double largest = 0;
@@ -74,6 +79,16 @@ double largest_difference(const Sample& sample, const Image<SplatPixel>& expecte
       largest = std::max(largest, std::abs(double{sample.irradiance(x, y)} - luminance_of(expected(x, y))));
   }
   return largest;
+}
+
+/// The number of pixels whose irradiances differ by more than `tolerance`.
+int different_pixels(const Sample& sample, const Image<SplatPixel>& expected, double tolerance) {
+  int count = 0;
+  for (int y = 0; y < sample.irradiance.height(); ++y) {
+    for (int x = 0; x < sample.irradiance.width(); ++x)
+      count += !(std::abs(double{sample.irradiance(x, y)} - luminance_of(expected(x, y))) <= tolerance);
+  }
+  return count;
 }
 
 double psnr(const Image<float>& a, const Image<float>& b) {
@@ -87,13 +102,17 @@ class SplatsOfEachKind : public testing::TestWithParam<std::tuple<int, SplatFilt
 TEST_P(SplatsOfEachKind, EqualThePublishedEquations) {
   const auto [degree, filter] = GetParam();
   const Splats splats = random_splats(600, degree, filter, 1);
-  for (const SplatOrder order : {SplatOrder::distance, SplatOrder::depth}) {
+  for (const SplatOrder order : {SplatOrder::distance, SplatOrder::depth, SplatOrder::ray}) {
     SplatOptions options;
     options.order = order;
     const Sample sample = render(splats, options);
-    const SplatRules rules{order == SplatOrder::depth ? SplatRules::Order::depth : SplatRules::Order::distance};
+    const SplatRules rules{order_in_reference(order)};
     const Image<SplatPixel> expected = render_slowly(splats, kPinhole, {}, rules);
-    EXPECT_LT(largest_difference(sample, expected), 2e-4);
+    if (order == SplatOrder::ray) {  // where two splats are equally near, up to rounding, either may be in front
+      EXPECT_LE(different_pixels(sample, expected, 2e-4), kPinhole.width * kPinhole.height / 1000);
+    } else {
+      EXPECT_LT(largest_difference(sample, expected), 2e-4);
+    }
     int seen = 0, differ = 0;
     for (int y = 0; y < kPinhole.height; ++y) {
       for (int x = 0; x < kPinhole.width; ++x) {
@@ -187,14 +206,86 @@ TEST(SplatRenderer, ShowsTheBackgroundBetweenSplats) {
 }
 
 TEST(SplatRenderer, TurningTheCameraDoesNotChangeTheOrder) {
-  // A turn by whole pixels about the image's centre: with distances, what a ray sees stays the same.
+  // A turn by whole pixels about the image's centre: with distances, and with depths on rays, what a ray sees stays the
+  // same.
   const Splats splats = random_splats(2000, 0, SplatFilter::antialiased, 4);
   Kinematics turned;
   turned.T_world_body.rotation = Eigen::AngleAxisd(std::numbers::pi / 2, Eigen::Vector3d::UnitZ());
   const Camera camera{64, 64, 60, 60, 31.5, 31.5, NoDistortion{}};
-  const Sample before = render(splats, {}, camera), after = render(splats, {}, camera, turned);
-  for (int y = 0; y < 64; ++y) {
-    for (int x = 0; x < 64; ++x) ASSERT_NEAR(after.irradiance(y, 63 - x), before.irradiance(x, y), 1e-4);
+  for (const SplatOrder order : {SplatOrder::distance, SplatOrder::ray}) {
+    SplatOptions options;
+    options.order = order;
+    const Sample before = render(splats, options, camera), after = render(splats, options, camera, turned);
+    for (int y = 0; y < 64; ++y) {
+      for (int x = 0; x < 64; ++x) ASSERT_NEAR(after.irradiance(y, 63 - x), before.irradiance(x, y), 1e-4);
+    }
+  }
+}
+
+/// Splats that are larger than the distances between them, so that most of them pass through each other.
+Splats interpenetrating_splats(std::size_t count, unsigned seed) {
+  Splats splats = random_splats(count, 0, SplatFilter::mip, seed);
+  for (std::size_t i = 0; i < count; ++i) {
+    splats.deviations[i] *= 10;
+    splats.opacities[i] *= i % 3 == 0 ? 1.0F : 0.1F;
+  }
+  return splats;
+}
+
+TEST(SplatRenderer, SortsInterpenetratingSplatsInEachPixel) {
+  SplatOptions options;
+  options.order = SplatOrder::ray;
+  for (unsigned seed = 20; seed < 22; ++seed) {
+    const Splats splats = interpenetrating_splats(300, seed);
+    const Image<SplatPixel> expected = render_slowly(splats, kPinhole, {}, {SplatRules::Order::ray});
+    EXPECT_LE(different_pixels(render(splats, options), expected, 1e-3), kPinhole.width * kPinhole.height / 1000);
+    const Image<SplatPixel> by_distance = render_slowly(splats, kPinhole, {}, {SplatRules::Order::distance});
+    EXPECT_GT(largest_difference(render(splats, options), by_distance), 0.05) << "the orders should differ";
+  }
+}
+
+TEST(SplatRenderer, BlendsCrossingDiscsInOppositeOrdersOnBothSides) {
+  // Two opaque discs that cross along the image's middle column at right angles: the nearer half of each is seen.
+  Splats splats = one_splat({0, 0, 2}, {100, 100, 0}, 0.99F, 1);
+  splats.positions.emplace_back(0, 0, 2), splats.deviations.emplace_back(100, 100, 0),
+      splats.opacities.push_back(0.99F);
+  splats.harmonics.insert(splats.harmonics.end(), 3, (0.2F - 0.5F) / 0.28209479F);
+  splats.rotations.clear();
+  for (const float angle : {0.785398F, -0.785398F})
+    splats.rotations.emplace_back(0, std::sin(0.5F * angle), 0, std::cos(0.5F * angle));
+  SplatOptions options;
+  options.order = SplatOrder::ray;
+  const Camera camera{41, 21, 40, 40, 20, 10, NoDistortion{}};
+  const Sample sample = render(splats, options, camera);
+  for (int y = 0; y < camera.height; ++y) {
+    for (int x = 2; x < camera.width - 2; ++x) {
+      if (x == 20) continue;
+      const bool first_in_front = x > 20;  // it turns its right side towards the camera
+      EXPECT_NEAR(sample.irradiance(x, y), first_in_front ? 0.99 * 1 + 0.0099 * 0.2 : 0.99 * 0.2 + 0.0099 * 1, 0.01)
+          << x << ", " << y;
+    }
+  }
+}
+
+TEST(SplatRenderer, SortsTilesAsTheFrameAndWithAnyNumberOfThreads) {
+  const Splats splats = interpenetrating_splats(300, 30);
+  SplatOptions options;
+  options.order = SplatOrder::ray;
+  const Workers one(1), three(3);
+  const auto renderer = make_splat_renderer(scene_of(splats), options, kPinhole, one);
+  const Sample frame = test::render(*renderer, kPinhole, {});
+  const Sample same = test::render(*make_splat_renderer(scene_of(splats), options, kPinhole, three), kPinhole, {});
+  EXPECT_TRUE(std::ranges::equal(frame.irradiance.pixels(), same.irradiance.pixels()));
+  EXPECT_TRUE(std::ranges::equal(frame.depth.pixels(), same.depth.pixels()));
+  for (const Tile& tile : {Tile{0, 0, 1, 1}, Tile{17, 3, 35, 21}, Tile{90, 60, 6, 12}, Tile{5, 31, 80, 2}}) {
+    Sample part;
+    renderer->render({0, {}, {tile}}, part);
+    for (int y = tile.y; y < tile.y + tile.height; ++y) {
+      for (int x = tile.x; x < tile.x + tile.width; ++x) {
+        ASSERT_EQ(part.irradiance(x, y), frame.irradiance(x, y)) << x << ", " << y;
+        ASSERT_EQ(part.depth(x, y), frame.depth(x, y)) << x << ", " << y;
+      }
+    }
   }
 }
 
@@ -223,7 +314,15 @@ TEST(SplatRenderer, SplatsPassTheCameraAndTheImageWithoutSteps) {
   }
 }
 
-TEST(SplatRenderer, MeshesHideWhatIsBehindThem) {
+class SplatsInEachOrder : public testing::TestWithParam<SplatOrder> {
+ protected:
+  SplatsInEachOrder() { options.order = GetParam(); }
+  SplatOptions options;
+};
+INSTANTIATE_TEST_SUITE_P(All, SplatsInEachOrder,
+                         testing::Values(SplatOrder::distance, SplatOrder::depth, SplatOrder::ray));
+
+TEST_P(SplatsInEachOrder, MeshesHideWhatIsBehindThem) {
   // A white splat 2 m away, which is nearly even, and one 1 m away at the left; a mesh 1.5 m away.
   Splats splats = one_splat({0, 0, 2}, {100, 100, 0}, 0.99F, 1);
   const Splats front = one_splat({-0.5F, 0, 1}, {0.1F, 0.1F, 0}, 0.99F, 0.5F);
@@ -242,7 +341,7 @@ TEST(SplatRenderer, MeshesHideWhatIsBehindThem) {
   SplatSurfaces surfaces{make_raster_renderer(build_raster_scene(scene), {}, camera, test::two_threads()), {1}};
   const auto moving = build_splat_scene({{std::make_shared<const Splats>(splats), 0}});
   const auto renderer =
-      make_splat_renderer(moving, {}, camera, test::two_threads(), ColourFilters::none, 1, std::move(surfaces));
+      make_splat_renderer(moving, options, camera, test::two_threads(), ColourFilters::none, 1, std::move(surfaces));
   Sample sample;
   renderer->render({0, {}, {{0, 0, 65, 33}}, {Kinematics{}, Kinematics{}}, true}, sample);
   const auto expect = [&](int x, double light, double depth, int object) {
@@ -255,13 +354,13 @@ TEST(SplatRenderer, MeshesHideWhatIsBehindThem) {
   expect(60, 0.99, 2, 1);                      // the splat behind, beside the mesh
 }
 
-TEST(SplatRenderer, BearsDamagedAndExtremeSplats) {
+TEST_P(SplatsInEachOrder, BearDamagedAndExtremeSplats) {
   constexpr float kInfinity = std::numeric_limits<float>::infinity(), kNaN = std::numeric_limits<float>::quiet_NaN();
   const Splats good = random_splats(300, 1, SplatFilter::mip, 6);
   const auto with = [&](const Eigen::Vector3f& position, const Eigen::Vector3f& deviations, float opacity) {
     Splats splats = good;
     splats.positions[7] = position, splats.deviations[7] = deviations, splats.opacities[7] = opacity;
-    return render(splats);
+    return render(splats, options);
   };
   const Eigen::Vector3f here(0, 0, 2), small(0.01F, 0.01F, 0.01F);
   for (const Sample& sample :
@@ -273,13 +372,13 @@ TEST(SplatRenderer, BearsDamagedAndExtremeSplats) {
   }
 }
 
-TEST(SplatRenderer, ManySplatsAtOnePlace) {
+TEST_P(SplatsInEachOrder, ManySplatsAtOnePlace) {
   Splats splats = one_splat({0, 0, 2}, {0.01F, 0.01F, 0.01F}, 0.01F, 1);
   constexpr std::size_t kMany = 20000;
   splats.positions.resize(kMany, splats.positions[0]), splats.deviations.resize(kMany, splats.deviations[0]);
   splats.rotations.resize(kMany, splats.rotations[0]), splats.opacities.resize(kMany, 0.01F);
   splats.harmonics.resize(kMany * 3, splats.harmonics[0]);
-  EXPECT_NEAR(render(splats).irradiance(46, 37), 1, 1e-3);
+  EXPECT_NEAR(render(splats, options).irradiance(46, 37), 1, 1e-3);
 }
 
 }  // namespace

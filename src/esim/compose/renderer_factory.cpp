@@ -133,6 +133,8 @@ RendererFactory factory(const SplatsRendererOptions& options, const SceneFile& f
   const bool only_splats = meshes.scene.objects.empty();
   if (options.engine == SplatsEngine::gl && !only_splats)
     throw UserError("renderer.engine: gl cannot render meshes among splats; use processor");
+  if (options.engine == SplatsEngine::gl && options.order == SplatOrder::ray)
+    throw UserError("renderer.order: ray needs engine: processor, not gl; or choose distance");
   MeshRendererOptions mesh;
   mesh.background = options.background;
   std::optional<RendererFactory> make_surfaces;
@@ -144,7 +146,8 @@ RendererFactory factory(const SplatsRendererOptions& options, const SceneFile& f
   splats.display_gamma = options.display_gamma;
   splats.background = static_cast<float>(options.background);
   splats.gain = static_cast<float>(options.gain);
-  const bool automatic_gl = options.engine == SplatsEngine::automatic && only_splats && prefers_gl(colour);
+  const bool automatic_gl = options.engine == SplatsEngine::automatic && only_splats &&
+                            options.order != SplatOrder::ray && prefers_gl(colour);
   if (options.engine == SplatsEngine::gl || automatic_gl) {
     return with_area(without_edges([objects, splats, device = options.gl_device](
                                        const Camera& camera, ColourFilters filters, double footprint, const Workers&) {

@@ -148,9 +148,11 @@ void describe(Visitor& visit, SplatsRendererOptions& o) {
   visit("projection", o.projection,
         About{"linear: by the pinhole's Jacobian at the centre of each splat; unscented: seven points of each splat, "
               "exactly through the lens; auto: linear without distortion, unscented otherwise"});
-  visit("order", o.order,
-        About{"order in which splats are blended, by their centres: distance, which does not change when the camera "
-              "turns, or depth, as in the original 3D Gaussian splatting, where it does and fires false events"});
+  visit(
+      "order", o.order,
+      About{"order in which splats are blended, by their centres: distance, which does not change when the camera "
+            "turns, or depth, as in the original 3D Gaussian splatting, where it does and fires false events; or ray: "
+            "in each pixel by the depth of the splats on its ray, several times slower, on the processor only"});
   visit("lighting", o.lighting, About{"of meshes; unlit: a surface is as bright as its texture"});
   visit("background", o.background, About{"irradiance behind everything", "", 0, 1e6});
 }
@@ -330,6 +332,6 @@ inline constexpr std::array<const char*, 3> kEnumNames<SplatFilter>{"dilated", "
 template <>
 inline constexpr std::array<const char*, 3> kEnumNames<SplatProjection>{"auto", "linear", "unscented"};
 template <>
-inline constexpr std::array<const char*, 2> kEnumNames<SplatOrder>{"distance", "depth"};
+inline constexpr std::array<const char*, 3> kEnumNames<SplatOrder>{"distance", "depth", "ray"};
 
 }  // namespace esim

@@ -7,6 +7,8 @@
 
 #include "esim/backends/splats/lanes.h"
 #include "esim/backends/splats/projected_cluster.h"
+#include "esim/backends/splats/ray_window.h"
+#include "esim/scene/splats/splats.h"
 
 // Private to backends/splats: includes hwy/highway.h.
 namespace esim::inline backends::inline splats {
@@ -15,12 +17,15 @@ namespace esim::inline backends::inline splats {
 inline constexpr int kBlockWidth = 4, kBlockHeight = kLanes / kBlockWidth;
 
 /// Blends the splats of a square of pixels, a bin, from front to back. Bins lie on a lattice from the image's corner.
+///
+/// In the order `ray`, the list of the bin is sorted by the depth in its middle only. A splat waits in the window of
+/// each block until no later one of the list can be in front of it anywhere in the bin.
 class Compositor {
  public:
   static constexpr int kSide = 16;  ///< of a bin, px
 
   /// `grey`: only the first colour is blended.
-  explicit Compositor(bool grey = false) : grey_(grey) {}
+  Compositor(SplatOrder order, bool grey) : order_(order), grey_(grey) {}
 
   /// Begins the bin whose first pixel is (left, top).
   void start(int left, int top);
@@ -28,9 +33,8 @@ class Compositor {
   /// Hides what lies behind a surface in a pixel of the bin; `nearness`: its inverse depth, 1/m.
   void set_surface(int column, int row, float nearness);
 
-  /// Adds a splat that may be visible in these columns and rows of the image. Splats with smaller `order` are in front;
-  /// it must be positive.
-  void add(const ScreenSplat& splat, float order, int left, int right, int top, int bottom);
+  /// Adds a splat that may be visible in these columns and rows of the image.
+  void add(const ScreenSplat& splat, int left, int right, int top, int bottom);
 
   /// Blends all splats of the bin.
   void blend();
@@ -66,18 +70,40 @@ class Compositor {
     return static_cast<std::size_t>(row % kBlockHeight * kBlockWidth + column % kBlockWidth);
   }
 
+  /// The pixels of a block, relative to the centre of a splat, and what the splat hides of the light behind it there.
+  struct Overlap {
+    Lanes dx, dy, opacity;
+    bool any;
+  };
+
+  float order_of(const ScreenSplat& splat) const;
   void sort();
+  template <class Body>
+  void for_each_block(const Listed& listed, const Body& body);
   template <bool kGrey>
   void blend_all();
   template <bool kGrey>
-  void add_to_block(const ScreenSplat& splat, float x, float y, Block& block);
+  void blend_by_ray();
+  template <bool kGrey>
+  void blend_front(RayWindow& window, float bound, Block& block);
+  void find_bounds();
+  Overlap overlap(const ScreenSplat& splat, float x, float y, const Block& block) const;
+  template <class Depth, class Object>
+  void hide(Lanes weight, const Depth& depth, const Object& object, Block& block);
 
+  SplatOrder order_;
   bool grey_;
   int left_ = 0, top_ = 0;
   bool surfaces_ = false;
   std::vector<Listed> splats_, sorted_;
   std::array<Block, static_cast<std::size_t>(kColumns* kRows)> blocks_;
   int finished_ = 0;
+
+  // For the order `ray`
+  std::vector<float> bounds_;  // per place in the list: the nearest that it and all later ones are, 1/m
+  static constexpr int kFields = 5;
+  std::vector<std::array<float, kFields>> colours_;  // per place: three colours, the object, what breaks ties
+  std::array<RayWindow, static_cast<std::size_t>(kColumns* kRows)> windows_;  // per block
 };
 
 }  // namespace esim::inline backends::inline splats

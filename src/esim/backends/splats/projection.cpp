@@ -272,14 +272,22 @@ void Projector::project_through(const Lens& lens, const SplatGroup& group, const
 
     // The Gaussian in the image
     const auto shape = lens.shape(mean, axes, inverse);
+    const auto depth_along = [&](std::size_t a) { return a < axes.size() ? axes[a][2] : zero; };
     Lanes xx = variance, xy = zero, yy = variance, own = zero, trace = zero;
+    Lanes depth_x = zero, depth_y = zero;  // covariances of depth and image, times the adjugate of the covariance
     for (std::size_t a = 0; a < shape.columns.size(); ++a) {
       const auto& [tx, ty] = shape.columns[a];
+      const Lanes tz = depth_along(a);
       xx = hn::MulAdd(tx, tx, xx), xy = hn::MulAdd(tx, ty, xy), yy = hn::MulAdd(ty, ty, yy);
       trace = hn::MulAdd(tx, tx, hn::MulAdd(ty, ty, trace));
-      for (std::size_t b = 0; b < a; ++b) {
-        const Lanes cross = hn::MulSub(tx, shape.columns[b].y, hn::Mul(ty, shape.columns[b].x));
-        own = hn::MulAdd(cross, cross, own);  // Binet and Cauchy: exact where xx yy - xy² cancels
+      depth_x = hn::MulAdd(variance, hn::Mul(tz, tx), depth_x);
+      depth_y = hn::MulAdd(variance, hn::Mul(tz, ty), depth_y);
+      for (std::size_t b = 0; b < a; ++b) {  // Binet and Cauchy: exact where xx yy - xy² cancels
+        const auto& [ux, uy] = shape.columns[b];
+        const Lanes uz = depth_along(b), cross = hn::MulSub(tx, uy, hn::Mul(ty, ux));
+        own = hn::MulAdd(cross, cross, own);
+        depth_x = hn::MulAdd(cross, hn::MulSub(tz, uy, hn::Mul(uz, ty)), depth_x);
+        depth_y = hn::MulAdd(cross, hn::MulSub(uz, tx, hn::Mul(tz, ux)), depth_y);
       }
     }
     const Lanes determinant = hn::MulAdd(variance, hn::Add(variance, trace), own);
@@ -288,15 +296,10 @@ void Projector::project_through(const Lens& lens, const SplatGroup& group, const
 
     // Depth, given the place in the image: the mean of the Gaussian there, with the filter's width, is linear. Its
     // inverse is continued linearly, which is exact on planes.
-    Lanes zu = zero, zv = zero, thickness = zero;
-    for (std::size_t axis = 0; axis < 3; ++axis) {
-      zu = hn::MulAdd(axes[axis][2], shape.columns[axis].x, zu),
-      zv = hn::MulAdd(axes[axis][2], shape.columns[axis].y, zv);
-      thickness = hn::MulAdd(axes[axis][2], axes[axis][2], thickness);
-    }
+    Lanes thickness = zero;
+    for (const LaneVector& axis : axes) thickness = hn::MulAdd(axis[2], axis[2], thickness);
     const Lanes fall = hn::Neg(hn::Div(hn::Mul(inverse, inverse), determinant));
-    const Lanes right = hn::Mul(fall, hn::MulSub(zu, yy, hn::Mul(zv, xy)));
-    const Lanes down = hn::Mul(fall, hn::MulSub(zv, xx, hn::Mul(zu, xy)));
+    const Lanes right = hn::Mul(fall, depth_x), down = hn::Mul(fall, depth_y);
     const Lanes extent = hn::Mul(all(3), hn::Sqrt(thickness));
     const Lanes farthest = hn::Div(one, hn::Add(z, extent));
     const Lanes nearest = hn::Div(one, hn::Max(hn::Sub(z, extent), hn::Mul(all(0.05F), z)));

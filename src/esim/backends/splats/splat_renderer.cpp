@@ -227,7 +227,7 @@ void SplatRenderer::compute(std::span<const RenderRequest> requests, Sample& sam
   prepare(requests, rays_.x.width(), rays_.x.height(), sample, deforms);
 
   work->requests.resize(requests.size());
-  work->threads.resize(static_cast<std::size_t>(workers_.threads()), {Compositor(grey_), {}});
+  work->threads.resize(static_cast<std::size_t>(workers_.threads()), {Compositor(options_.order, grey_), {}});
   workers_.for_each(static_cast<int>(requests.size()), [&](int r) {
     collect(requests[static_cast<std::size_t>(r)], work->requests[static_cast<std::size_t>(r)]);
   });
@@ -307,9 +307,7 @@ void SplatRenderer::render_part(const RenderRequest& request, const RequestWork&
     }
     for (std::size_t k = 0; k < cluster.count; ++k) {
       if (inside[k] == 0) continue;
-      const ScreenSplat& splat = cluster.splats[k];
-      const float order = options_.order == SplatOrder::distance ? splat.distance : 1 / splat.nearness;
-      compositor.add(splat, order, cluster.left[k], cluster.right[k], cluster.top[k], cluster.bottom[k]);
+      compositor.add(cluster.splats[k], cluster.left[k], cluster.right[k], cluster.top[k], cluster.bottom[k]);
     }
   }
   compositor.blend();

@@ -14,6 +14,9 @@ inline constexpr float kNearest = 0.01F;
 inline constexpr float kOpaque = 0.99F;    ///< the largest opacity, as in the original 3D Gaussian splatting
 inline constexpr float kFinished = 1e-4F;  ///< transmittance below which pixels are finished, likewise
 
+/// Weight of the inverse distance of a splat's centre in the order `ray`, relative to its inverse depth on the ray.
+inline constexpr float kTieBreak = 1.0F / 1024;
+
 /// Bearings at which the Jacobian of a linear projection is taken, relative to those of the image, likewise.
 inline constexpr float kLinearLimit = 1.3F;
 

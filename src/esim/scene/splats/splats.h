@@ -33,6 +33,8 @@ enum class SplatProjection {
 enum class SplatOrder {
   distance,  ///< of their centres from the camera: it stays the same when the camera turns
   depth,     ///< of their centres, as the original 3D Gaussian splatting
+  ray,       ///< in each pixel, by the depth at which a splat contributes most to it, and by the distance of the
+             ///< centres where these depths are equal; on the processor only
 };
 
 inline constexpr float kHarmonic0 = 0.28209479177387814F;  ///< Y of degree 0: sqrt(1 / 4π)

@@ -241,6 +241,8 @@ class GlSplatRenderer final : public Renderer {
 
 std::unique_ptr<Renderer> make_gl_splat_renderer(const std::vector<SplatObject>& objects, const SplatOptions& options,
                                                  const Camera& camera, std::optional<int> device, double footprint) {
+  if (options.order == SplatOrder::ray)
+    throw UserError("splats by OpenGL: the order must be distance or depth, not ray; use the processor's renderer");
   return std::make_unique<GlSplatRenderer>(objects, options, camera, device, footprint);
 }
 

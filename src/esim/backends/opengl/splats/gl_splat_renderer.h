@@ -17,8 +17,8 @@ namespace esim::inline backends::inline opengl {
 /// pixels average over, px.
 ///
 /// All objects must have the same SplatLight. Each renderer has its own context; only one thread may use it at a time.
-/// Throws UserError if there is no such device, or if the splats are too many for it; so do renderings that need too
-/// much memory.
+/// Throws UserError if there is no such device, if the splats are too many for it, or for SplatOrder::ray; so do
+/// renderings that need too much memory.
 std::unique_ptr<Renderer> make_gl_splat_renderer(const std::vector<SplatObject>& objects, const SplatOptions& options,
                                                  const Camera& camera, std::optional<int> device, double footprint = 1);
 

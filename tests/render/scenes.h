@@ -145,7 +145,7 @@ inline Scene plain_moving_scene() {
   return scene;
 }
 
-/// A mesh that shears to and fro, so that its flat faces remain flat.
+/// A mesh that shears periodically, so that its flat faces remain flat.
 class Swinging final : public Deformation {
  public:
   Swinging(std::vector<Eigen::Vector3f> vertices, float amplitude, float frequency_hz)

@@ -10,13 +10,13 @@
 #include <utility>
 
 #include "esim/backends/opengl/gl_context.h"
-#include "esim/backends/opengl/gl_gloss.h"
 #include "esim/backends/opengl/gl_program.h"
 #include "esim/backends/opengl/gl_read_back.h"
 #include "esim/backends/opengl/gl_scene.h"
 #include "esim/backends/opengl/gl_shaders.h"
-#include "esim/backends/opengl/gl_shadows.h"
 #include "esim/backends/opengl/gl_targets.h"
+#include "esim/backends/opengl/lighting/gl_gloss.h"
+#include "esim/backends/opengl/lighting/gl_shadows.h"
 #include "esim/core/error.h"
 #include "esim/render/bands.h"
 #include "esim/render/motion_field.h"

@@ -1,4 +1,4 @@
-#include "esim/backends/opengl/gl_shadows.h"
+#include "esim/backends/opengl/lighting/gl_shadows.h"
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>

@@ -1,4 +1,4 @@
-#include "esim/backends/opengl/gl_gloss.h"
+#include "esim/backends/opengl/lighting/gl_gloss.h"
 
 #include <Eigen/Geometry>
 #include <algorithm>

@@ -85,7 +85,7 @@ class FlickeringLight : public test::CardScene {
     StaticTrajectoryOptions still;
     still.pose.position = {-1, 0, 0};
     still.pose.quaternion = Eigen::Vector4d(0, 0, 0, 1);
-    mesh().objects = {{"card", folder_.path() / "card.obj", 1.0, still, flicker}};
+    mesh().objects = {{"card", folder_.path() / "card.obj", 1.0, still, {}, flicker}};
   }
 
   /// The card of CardScene, which crosses the image at 0.5 s.

@@ -12,26 +12,27 @@
 namespace esim::inline reproject {
 namespace {
 
-using Corners = std::array<Eigen::Vector3d, 3>;
+using Triangle = PlacedTriangles::Triangle;
 
-/// The map of a triangle's corners and its unit normal, both in the camera frame. A triangle that is nearly a line only
-/// moves, by `rigid` and by what its first corner moves in addition.
-ViewChange change_of(const Corners& from, const Corners& to, const ViewChange& rigid) {
-  constexpr double kFlat = 1e-4;  // sine of an angle
-  const auto frame = [&](const Corners& at, Eigen::Matrix3d& sides) {
-    sides.col(0) = at[1] - at[0], sides.col(1) = at[2] - at[0];
-    const Eigen::Vector3d normal = sides.col(0).cross(sides.col(1));
-    const double area = normal.norm();
-    sides.col(2) = normal / area;
-    return area > kFlat * sides.col(0).norm() * sides.col(1).norm();
-  };
-  Eigen::Matrix3d sides, sides_there, map;
-  if (frame(from, sides) && frame(to, sides_there)) {
-    map = sides_there * sides.inverse();
-  } else {
-    map = rigid.R.cast<double>();
-  }
-  return {map.cast<float>(), (to[0] - map * from[0]).cast<float>()};
+Triangle placed(std::uint16_t part, const std::array<Eigen::Vector3d, 3>& corners) {
+  constexpr double kLine = 1e-4;  // sine of an angle
+  Triangle triangle{part, false, corners[0], {}, {}};
+  triangle.sides.col(0) = corners[1] - corners[0], triangle.sides.col(1) = corners[2] - corners[0];
+  const Eigen::Vector3d normal = triangle.sides.col(0).cross(triangle.sides.col(1));
+  const double area = normal.norm();
+  triangle.is_line = !(area > kLine * triangle.sides.col(0).norm() * triangle.sides.col(1).norm());
+  if (triangle.is_line) return triangle;
+  triangle.sides.col(2) = normal / area;
+  triangle.inverse = triangle.sides.inverse();
+  return triangle;
+}
+
+/// The map from one time to another. A triangle that is nearly a line only moves, by `rigid` and by what its first
+/// corner moves in addition.
+ViewChange change_of(const Triangle& from, const Triangle& to, const ViewChange& rigid) {
+  const Eigen::Matrix3d map =
+      from.is_line || to.is_line ? Eigen::Matrix3d(rigid.R.cast<double>()) : Eigen::Matrix3d(to.sides * from.inverse);
+  return {map.cast<float>(), (to.corner - map * from.corner).cast<float>()};
 }
 
 }  // namespace
@@ -91,42 +92,49 @@ std::vector<std::uint16_t> SceneParts::deforming(std::span<const std::uint16_t> 
   return found;
 }
 
-std::vector<ViewChange> SceneParts::changes(const RenderRequest& from, const RenderRequest& to,
-                                            const std::vector<std::uint16_t>& wanted) const {
-  std::vector<ViewChange> changes = view_changes(from, to);
-  if (wanted.empty()) return changes;
-  changes.resize(count_);
-  for (const Triangles& triangles : deforming_) change_triangles(triangles, from, to, wanted, changes);
-  return changes;
+PlacedTriangles SceneParts::place(const RenderRequest& view, const std::vector<std::uint16_t>& wanted) const {
+  PlacedTriangles result{view, {}};
+  result.triangles.reserve(wanted.size());
+  for (const Triangles& of : deforming_) {
+    const auto begin = std::lower_bound(wanted.begin(), wanted.end(), of.first);
+    const auto end = std::lower_bound(begin, wanted.end(), of.first + of.count);
+    std::vector<SurfacePoint> corners;
+    for (auto part = begin; part != end; ++part) {
+      const auto triangle = static_cast<std::uint32_t>(*part - of.first);
+      corners.insert(corners.end(), {{triangle, 0, 0}, {triangle, 1, 0}, {triangle, 0, 1}});
+    }
+    if (corners.empty()) continue;
+    std::vector<Eigen::Vector3f> positions(corners.size());
+    surfaces_->locate(of.object, view.t, corners, positions);
+    const SE3 T_camera_object = view.camera.T_world_body.inverse() * view.objects[of.object - 1].T_world_body;
+    const Eigen::Matrix3d R = T_camera_object.rotation.toRotationMatrix();
+    const auto in_camera = [&](const Eigen::Vector3f& at) {
+      return Eigen::Vector3d(R * at.cast<double>() + T_camera_object.translation);
+    };
+    for (std::size_t i = 0; i < positions.size(); i += 3) {
+      result.triangles.push_back(
+          placed(begin[static_cast<std::ptrdiff_t>(i / 3)],
+                 {in_camera(positions[i]), in_camera(positions[i + 1]), in_camera(positions[i + 2])}));
+    }
+  }
+  return result;
 }
 
-void SceneParts::change_triangles(const Triangles& triangles, const RenderRequest& from, const RenderRequest& to,
-                                  const std::vector<std::uint16_t>& wanted, std::vector<ViewChange>& changes) const {
-  const auto begin = std::lower_bound(wanted.begin(), wanted.end(), triangles.first);
-  const auto end = std::lower_bound(begin, wanted.end(), triangles.first + triangles.count);
-  if (begin == end) return;
-  std::vector<SurfacePoint> corners;
-  for (auto part = begin; part != end; ++part) {
-    const auto triangle = static_cast<std::uint32_t>(*part - triangles.first);
-    corners.insert(corners.end(), {{triangle, 0, 0}, {triangle, 1, 0}, {triangle, 0, 1}});
-  }
-  std::vector<Eigen::Vector3f> before(corners.size()), after(corners.size());
-  surfaces_->locate(triangles.object, from.t, corners, before);
-  surfaces_->locate(triangles.object, to.t, corners, after);
+std::size_t SceneParts::object_of(std::uint16_t part) const {
+  auto of = deforming_.begin();
+  while (of->first + of->count <= part) ++of;
+  return of->object;
+}
 
-  const auto in_camera = [&](const RenderRequest& view) {
-    return view.camera.T_world_body.inverse() * view.objects[triangles.object - 1].T_world_body;
-  };
-  const SE3 T_from_object = in_camera(from), T_to_object = in_camera(to);
-  const ViewChange rigid = changes[triangles.object];
-  for (std::size_t i = 0; i < corners.size(); i += 3) {
-    Corners here, there;
-    for (std::size_t k = 0; k < 3; ++k) {
-      here[k] = T_from_object * before[i + k].cast<double>();
-      there[k] = T_to_object * after[i + k].cast<double>();
-    }
-    changes[begin[static_cast<std::ptrdiff_t>(i / 3)]] = change_of(here, there, rigid);
+std::vector<ViewChange> SceneParts::changes(const PlacedTriangles& from, const PlacedTriangles& to) const {
+  std::vector<ViewChange> changes = view_changes(from.view, to.view);
+  if (from.triangles.empty()) return changes;
+  changes.resize(count_);
+  for (std::size_t i = 0; i < from.triangles.size(); ++i) {
+    const std::uint16_t part = from.triangles[i].part;
+    changes[part] = change_of(from.triangles[i], to.triangles[i], changes[object_of(part)]);
   }
+  return changes;
 }
 
 }  // namespace esim::inline reproject

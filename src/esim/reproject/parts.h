@@ -22,6 +22,19 @@ struct ViewChange {
 /// The changes from view `from` to view `to` of what is rigid: [0] for the static scene, [i] for object i.
 std::vector<ViewChange> view_changes(const RenderRequest& from, const RenderRequest& to);
 
+/// Triangles of deforming objects in a view, in the camera frame.
+struct PlacedTriangles {
+  struct Triangle {
+    std::uint16_t part;
+    bool is_line;                    ///< or nearly one
+    Eigen::Vector3d corner;          ///< the first one, m
+    Eigen::Matrix3d sides, inverse;  ///< from that to the others, m, and the unit normal
+  };
+
+  const RenderRequest& view;
+  std::vector<Triangle> triangles;  ///< in the order of the parts
+};
+
 /// The parts of a scene that move differently: 0 is the static scene, i is the rigid object i, and of objects that
 /// deform, every triangle is a part of its own.
 class SceneParts {
@@ -38,18 +51,19 @@ class SceneParts {
   /// Those of `parts` that deform, each once, in order.
   std::vector<std::uint16_t> deforming(std::span<const std::uint16_t> parts) const;
 
-  /// The changes from view `from` to view `to`, by part; of triangles, only for those in `wanted`, which is in order.
-  /// The change of a triangle is the affine map that takes its corners and its unit normal to those at the other time.
-  std::vector<ViewChange> changes(const RenderRequest& from, const RenderRequest& to,
-                                  const std::vector<std::uint16_t>& wanted) const;
+  /// Those of `wanted`, deforming parts in order, in a view.
+  PlacedTriangles place(const RenderRequest& view, const std::vector<std::uint16_t>& wanted) const;
+
+  /// The changes from one view to another, by part; of triangles, for those that are placed in both. The change of a
+  /// triangle is the affine map that takes its corners and its unit normal to those at the other time.
+  std::vector<ViewChange> changes(const PlacedTriangles& from, const PlacedTriangles& to) const;
 
  private:
   struct Triangles {
     std::size_t object, first, count;  // first: part
   };
 
-  void change_triangles(const Triangles& triangles, const RenderRequest& from, const RenderRequest& to,
-                        const std::vector<std::uint16_t>& wanted, std::vector<ViewChange>& changes) const;
+  std::size_t object_of(std::uint16_t part) const;
 
   std::shared_ptr<const DeformingSurfaces> surfaces_;
   std::vector<Triangles> deforming_;  // of each deforming object

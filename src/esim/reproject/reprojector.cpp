@@ -73,10 +73,10 @@ struct Reprojector::Between {
     std::vector<std::uint16_t> wanted;
     std::set_union(before.deforming.begin(), before.deforming.end(), after.deforming.begin(), after.deforming.end(),
                    std::back_inserter(wanted));
-    from_before = parts.changes(before.view, view, before.deforming);
-    from_after = parts.changes(after.view, view, after.deforming);
-    to_before = parts.changes(view, before.view, wanted);
-    to_after = parts.changes(view, after.view, wanted);
+    const PlacedTriangles then = parts.place(before.view, wanted), now = parts.place(view, wanted),
+                          later = parts.place(after.view, wanted);
+    from_before = parts.changes(then, now), from_after = parts.changes(later, now);
+    to_before = parts.changes(now, then), to_after = parts.changes(now, later);
   }
 
   const Keyframe &before, &after;

@@ -55,7 +55,7 @@ std::uint32_t pixels_on_edges(const SceneTriangles& scene, const RayBlock& block
   for (std::uint32_t unsure = hits0 & ~edges & ~lanes_equal<K>(other_triangle.data(), 0); unsure != 0;
        unsure &= unsure - 1) {
     const auto i = static_cast<unsigned>(std::countr_zero(unsure));
-    if (scene.triangle(centre.triangles[i]).material != scene.triangle(corner.triangles[i]).material) edges |= 1U << i;
+    if (scene.material(centre.triangles[i]) != scene.material(corner.triangles[i])) edges |= 1U << i;
   }
   return edges;
 }

@@ -87,7 +87,8 @@ struct GlossySurface {
     const auto& R = rotations.element;
     for (std::uint32_t left = gloss.rough; left != 0; left &= left - 1) {
       const auto i = static_cast<std::size_t>(std::countr_zero(left));
-      const TriangleShading& triangle = shapes.triangle(triangles[i]);
+      TriangleShading memory;
+      const TriangleShading& triangle = shapes.triangle(triangles[i], memory);
       const auto rotated = [&](const float* v) {
         return Eigen::Vector3f(R[0][i] * v[0] + R[1][i] * v[1] + R[2][i] * v[2],
                                R[3][i] * v[0] + R[4][i] * v[1] + R[5][i] * v[2],

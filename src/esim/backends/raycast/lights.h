@@ -87,11 +87,9 @@ struct SurfacePoints {
     const auto& hit = packet.ray.hit;
     VectorLanes<K> normals;
     for (unsigned i = 0; i < K; ++i) {
-      Eigen::Vector3f n = Eigen::Vector3f::Zero();
-      if (const auto* corner = scene.corner_normals(triangles[i])) {
-        const float b1 = hit.u[i], b2 = hit.v[i];
-        n = (1 - b1 - b2) * (*corner)[0] + b1 * (*corner)[1] + b2 * (*corner)[2];
-      }
+      const CornerNormals corner = scene.corner_normals(triangles[i]);
+      const float b1 = hit.u[i], b2 = hit.v[i];
+      Eigen::Vector3f n = (1 - b1 - b2) * corner[0] + b1 * corner[1] + b2 * corner[2];
       if (!(n.squaredNorm() > 1e-12F)) n = {hit.Ng_x[i], hit.Ng_y[i], hit.Ng_z[i]};
       normals.x[i] = n.x(), normals.y[i] = n.y(), normals.z[i] = n.z();
     }

@@ -247,7 +247,7 @@ class RaycastRenderer final : public ProcessorRenderer {
     if (moment.groups.size() > 1) {
       for (unsigned i = 0; i < K; ++i) rays.triangle[i] += scene_->first_triangle(rays.packet.group(i));
     }
-    for (const std::uint32_t triangle : rays.triangle) __builtin_prefetch(&moment.triangles->triangle(triangle));
+    for (const std::uint32_t triangle : rays.triangle) moment.triangles->prefetch(triangle);
   }
 
   template <int K>

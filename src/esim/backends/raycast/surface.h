@@ -43,9 +43,10 @@ struct HitTriangles {
   alignas(64) std::array<std::uint32_t, K> material;
 
   void gather(const SceneTriangles& scene, const std::array<std::uint32_t, K>& indices) {
+    thread_local std::array<TriangleShading, K> memory;
     std::array<const TriangleShading*, K> triangles;
     for (unsigned i = 0; i < K; ++i) {
-      triangles[i] = &scene.triangle(indices[i]);
+      triangles[i] = &scene.triangle(indices[i], memory[i]);
       material[i] = triangles[i]->material;
     }
     for (unsigned i = 0; i < K; i += 4) {

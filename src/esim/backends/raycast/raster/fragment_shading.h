@@ -96,7 +96,7 @@ class FragmentShading {
         work.first_material[i] = scene_.first_material(colour_at(column, row));
       }
     }
-    for (const std::uint32_t index : rays.triangle) __builtin_prefetch(&moment_.triangles->triangle(index));
+    for (const std::uint32_t index : rays.triangle) moment_.triangles->prefetch(index);
   }
 
   /// Sides of the parallelogram over which the texture of a fragment is averaged, in footprints of a complete pixel:

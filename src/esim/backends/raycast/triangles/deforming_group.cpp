@@ -52,7 +52,7 @@ std::size_t DeformingGroup::branches_at(TimeNs t) const {
 
 std::shared_ptr<const DeformedGroup> DeformingGroup::at(TimeNs t) const {
   std::shared_ptr<DeformedGroup> group = find(t);
-  if (group->t == t && !group->shading.empty()) return group;
+  if (group->t == t && !group->vertices.positions.empty()) return group;
   deform(t, *group);
   const std::lock_guard lock(mutex_);
   recent_.push_back(group);
@@ -91,19 +91,6 @@ void DeformingGroup::deform(TimeNs t, DeformedGroup& group) const {
     if (group.triangles.rays.scene() == nullptr)
       group.triangles.rays = RayTriangles(use_.device, first_vertices_, corners_, true);
     group.triangles.rays.refit(positions);
-  }
-  if (group.shading.empty()) group.shading = shading_;
-  for (std::size_t i = 0; i < corners_.size(); ++i) {
-    const auto& [a, b, c] = corners_[i];
-    group.shading[i].place(positions[a], positions[b], positions[c]);
-  }
-  const std::vector<Eigen::Vector3f>& normals = group.vertices.normals;
-  if (use_.normals && !normals.empty()) {
-    group.normals.resize(corners_.size());
-    for (std::size_t i = 0; i < corners_.size(); ++i) {
-      const auto& [a, b, c] = corners_[i];
-      group.normals[i] = {normals[a], normals[b], normals[c]};
-    }
   }
   group.t = t;
 }

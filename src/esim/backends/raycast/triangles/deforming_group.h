@@ -18,8 +18,6 @@ struct DeformedGroup {
   std::size_t branches = 0;  ///< index of the tree whose branches its tree has
   DeformedVertices vertices;
   GroupTriangles triangles;
-  std::vector<TriangleShading> shading;
-  std::vector<CornerNormals> normals;
 };
 
 /// The triangles of a deforming object at any time. Any number of threads may use it.
@@ -40,6 +38,12 @@ class DeformingGroup {
   /// Contains the object at a time.
   Eigen::AlignedBox3f bounds(TimeNs t) const { return deformation_->bounds(t); }
 
+  /// Sets the data of its triangles, from `first` on, to those of the object at one time, which must remain.
+  void describe(const DeformedGroup& at, std::uint32_t first, SceneTriangles& triangles) const {
+    const bool flat = !use_.normals || at.vertices.normals.empty();
+    triangles.set(first, shading_, corners_, at.vertices.positions.data(), flat ? nullptr : at.vertices.normals.data());
+  }
+
   /// The object at a time. Objects of the last few times are kept, and the memory of those before is used again.
   std::shared_ptr<const DeformedGroup> at(TimeNs t) const;
 
@@ -52,7 +56,7 @@ class DeformingGroup {
   std::shared_ptr<const Deformation> deformation_;
   TriangleUse use_;
   std::vector<Corners> corners_;
-  std::vector<TriangleShading> shading_;  // whose gradients change
+  std::vector<TriangleShading> shading_;  // with the gradients of the first shape
 
   // A tree that is refitted far from the shape for which it was built is slow, so that there are several; each is used
   // at the times that are nearest to its own.
@@ -77,7 +81,7 @@ class DeformsLater {
   const DeformedGroup& get() const {
     std::call_once(once_, [this] {
       deformed_ = group_.at(t_);
-      triangles_.set(first_triangle_, deformed_->shading, deformed_->normals);
+      group_.describe(*deformed_, first_triangle_, triangles_);
     });
     return *deformed_;
   }

@@ -64,7 +64,7 @@ def print_motion_field(folder):
         for rate in (1000, 500):
             out = folder / f"flow{key}-{rate}"
             simulate(FOLDER / "scenes/walker.yaml", out, f"start_s={key / 60 + 0.001}", "duration_s=0.012",
-                     f"truth.rate_hz={rate}", "truth.optical_flow=true", "truth.objects=true", "camera.sampling.lambda=2")
+                     f"truth.rate_hz={rate}", "truth.optical_flow=true", "truth.objects=true", "output.compression=none")
             with h5py.File(out / "cam0/truth.h5") as truth:
                 v, flow, seen = truth["motion_field"][:], truth["optical_flow"][:], truth["objects"][:]
             flows.append((flow[-len(v) + 1:] * rate, v, seen))

@@ -40,9 +40,10 @@ class GlDeformingObject {
   /// A ball that contains it at a time, in its frame: centre and radius.
   std::pair<Eigen::Vector3f, float> ball(TimeNs t) const;
 
-  /// Replaces the number of a triangle in the buffer by that in the mesh, and returns its velocity in the object's
-  /// frame at the time of `vertices`, m/s.
-  Eigen::Vector3f take(SurfacePoint& point, const DeformedVertices& vertices) const;
+  /// Makes a point of the mesh from the number of its triangle in the buffer and its position in the object's frame, m,
+  /// which barycentric coordinates from the device only approximate if a lens distorts. Returns the point's velocity in
+  /// the object's frame at the time of `vertices`, m/s.
+  Eigen::Vector3f take(SurfacePoint& point, const Eigen::Vector3d& position, const DeformedVertices& vertices) const;
 
  private:
   std::shared_ptr<const Deformation> deformation_;

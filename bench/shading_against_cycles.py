@@ -88,9 +88,9 @@ def write_sky(path, height=128):
 
 def integral(sky, n, v, metallic, roughness):
     """What a point with the normal n reflects to v, by the equations, summed over the pixels of the sky."""
-    light, l, weight = sky
-    n_l, n_v = np.maximum(l @ n, 0), n @ v
-    h = l + v
+    light, towards, weight = sky
+    n_l, n_v = np.maximum(towards @ n, 0), n @ v
+    h = towards + v
     h /= np.maximum(np.linalg.norm(h, axis=-1), 1e-9)[..., None]
     a2 = roughness ** 4
     lobe = a2 / ((h @ n) ** 2 * (a2 - 1) + 1) ** 2 * 0.5 / np.maximum(

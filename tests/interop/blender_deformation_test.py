@@ -7,12 +7,11 @@ Run as: blender_deformation_test.py PRINT_VERTICES ESIM_PROGRAM. Skips (77) with
 """
 
 import pathlib
+import shutil
 import subprocess
 import sys
 import tempfile
 import unittest
-
-from shutil import which
 
 try:
     import numpy as np
@@ -96,7 +95,7 @@ class BlenderDeformation(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    if np is None or which("blender") is None:
+    if np is None or shutil.which("blender") is None:
         print("needs Blender and NumPy")
         sys.exit(77)
     unittest.main(argv=sys.argv[:1])

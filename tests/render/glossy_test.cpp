@@ -369,6 +369,22 @@ Scene still_life(bool shadows, bool areas) {
   return scene;
 }
 
+/// The mean absolute difference of E, and the fraction of the pixels in which it is above a limit.
+struct Agreement {
+  double mean = 0, different = 0;
+};
+
+Agreement agreement(const Sample& a, const Sample& b, double limit) {
+  Agreement found;
+  const std::size_t count = a.irradiance.size();
+  for (std::size_t k = 0; k < count; ++k) {
+    const double off = std::fabs(double{a.irradiance.data()[k]} - double{b.irradiance.data()[k]});
+    found.mean += off / static_cast<double>(count);
+    found.different += (off > limit ? 1.0 : 0.0) / static_cast<double>(count);
+  }
+  return found;
+}
+
 TEST(GlossySurfaces, EnginesAgree) {
   const Camera model = Camera::from_fov(160, 120, 1.0);
   const Kinematics camera = looking({1.4, -1.9, 1.0}, {0, 0, 0.4});
@@ -378,14 +394,9 @@ TEST(GlossySurfaces, EnginesAgree) {
         *make_raycast_renderer(build_raycast_scene(scene), {0, 64}, model, test::two_threads()), model, camera);
     const Sample drawn = test::render(
         *make_raster_renderer(build_raster_scene(scene), {0, 64}, model, test::two_threads()), model, camera);
-    double sum = 0;
-    int different = 0;
-    for (std::size_t k = 0; k < cast.irradiance.size(); ++k) {
-      const double off = std::fabs(double{cast.irradiance.data()[k]} - double{drawn.irradiance.data()[k]});
-      sum += off, different += off > 0.03;
-    }
-    EXPECT_LT(sum / static_cast<double>(cast.irradiance.size()), 1e-3) << shadows;
-    EXPECT_LT(different, static_cast<int>(cast.irradiance.size()) / 500) << "edges of shadows only; " << shadows;
+    const Agreement found = agreement(cast, drawn, 0.03);
+    EXPECT_LT(found.mean, 1e-3) << shadows;
+    EXPECT_LT(found.different, 1.0 / 500) << "edges of shadows only; " << shadows;
   }
 }
 
@@ -398,14 +409,9 @@ TEST(GlossySurfaces, GlAgreesWithRays) {
     const Sample cast = test::render(
         *make_raycast_renderer(build_raycast_scene(scene), {0, 1}, model, test::two_threads()), model, camera);
     const Sample gl = test::render(*make_gl_renderer(scene, {0, 1}, model), model, camera);
-    double sum = 0;
-    int different = 0;
-    for (std::size_t k = 0; k < cast.irradiance.size(); ++k) {
-      const double off = std::fabs(double{cast.irradiance.data()[k]} - double{gl.irradiance.data()[k]});
-      sum += off, different += off > 0.01;
-    }
-    EXPECT_LT(sum / static_cast<double>(cast.irradiance.size()), 3e-3) << shadows;
-    EXPECT_LT(different, static_cast<int>(cast.irradiance.size()) / 50) << "outlines and edges of shadows only";
+    const Agreement found = agreement(cast, gl, 0.01);
+    EXPECT_LT(found.mean, 3e-3) << shadows;
+    EXPECT_LT(found.different, 1.0 / 50) << "outlines and edges of shadows only";
   }
 }
 

@@ -12,37 +12,20 @@
 
 #include "esim/core/error.h"
 #include "esim/scene/scene_file.h"
+#include "loaded_glb.h"
 #include "skinned_glb.h"
 #include "support/errors.h"
 #include "support/numeric.h"
-#include "support/temporary_directory.h"
 
 namespace esim {
 namespace {
 
 using Json = nlohmann::json;
 using test::GlbWriter;
+using test::load;
+using test::Loaded;
+using test::refusal;
 using test::SkinnedFigure;
-
-struct Loaded {
-  SceneFile file;
-  std::vector<std::string> warnings;
-  const Mesh& mesh() const { return file.scene.objects.at(0).mesh; }
-};
-
-Loaded load(const std::string& bytes) {
-  const test::TemporaryDirectory folder;
-  Loaded loaded;
-  loaded.file = load_scene_file(folder.write("scene.glb", bytes),
-                                [&](const std::string& text) { loaded.warnings.push_back(text); });
-  return loaded;
-}
-
-Loaded load(const GlbWriter& glb) { return load(glb.bytes()); }
-
-std::string refusal(const GlbWriter& glb) {
-  return test::message_of<UserError>([&] { load(glb); });
-}
 
 /// The file is read or refused.
 bool survives(const std::string& bytes) {

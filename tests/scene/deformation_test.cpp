@@ -6,34 +6,20 @@
 #include "esim/core/error.h"
 #include "esim/scene/deformation/adapted.h"
 #include "esim/scene/scene_file.h"
+#include "loaded_glb.h"
 #include "skinned_glb.h"
 #include "support/errors.h"
 #include "support/numeric.h"
-#include "support/temporary_directory.h"
 
 namespace esim {
 namespace {
 
 using Json = nlohmann::json;
 using test::GlbWriter;
+using test::load;
+using test::Loaded;
+using test::refusal;
 using test::SkinnedFigure;
-
-struct Loaded {
-  SceneFile file;
-  std::vector<std::string> warnings;
-};
-
-Loaded load(const GlbWriter& glb) {
-  const test::TemporaryDirectory folder;
-  Loaded loaded;
-  loaded.file = load_scene_file(folder.write("scene.glb", glb.bytes()),
-                                [&](const std::string& text) { loaded.warnings.push_back(text); });
-  return loaded;
-}
-
-std::string refusal(const GlbWriter& glb) {
-  return test::message_of<UserError>([&] { load(glb); });
-}
 
 /// In glTF y points up, in esim z.
 Eigen::Vector3d from_gltf(const Eigen::Vector3d& v) { return {v.x(), -v.z(), v.y()}; }

@@ -60,11 +60,8 @@ class SceneSurfaces final : public DeformingSurfaces {
               std::span<Eigen::Vector3f> positions) const override {
     const auto& [shapes, triangles] = objects_[object - 1];
     const std::shared_ptr<const DeformedVertices> vertices = shapes->at(t);
-    const std::vector<Eigen::Vector3f>& at = vertices->positions;
-    for (std::size_t i = 0; i < points.size(); ++i) {
-      const auto& [a, b, c] = triangles[points[i].triangle];
-      positions[i] = at[a] + points[i].b1 * (at[b] - at[a]) + points[i].b2 * (at[c] - at[a]);
-    }
+    for (std::size_t i = 0; i < points.size(); ++i)
+      positions[i] = at_point(vertices->positions, triangles[points[i].triangle], points[i]);
   }
 
  private:

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "esim/core/time.h"
-#include "esim/render/sample.h"
+#include "esim/render/surface_point.h"
 
 namespace esim::inline render {
 

@@ -5,14 +5,9 @@
 
 #include "esim/core/image.h"
 #include "esim/core/time.h"
+#include "esim/render/surface_point.h"
 
 namespace esim::inline render {
-
-/// A point of an object: p0 + b1 (p1 - p0) + b2 (p2 - p0) on the triangle with the corners p0, p1, p2.
-struct SurfacePoint {
-  std::uint32_t triangle = 0;  ///< of the object's mesh
-  float b1 = 0, b2 = 0;
-};
 
 /// One evaluation of the scene by one camera: a field per quantity, all of the image's size. Only the pixels in `tiles`
 /// are valid.

@@ -46,8 +46,7 @@ Eigen::Vector3f GlDeformingObject::take(SurfacePoint& point, const Eigen::Vector
     point.b1 = static_cast<float>(e2.cross(normal).dot(to) / area2);
     point.b2 = static_cast<float>(normal.cross(e1).dot(to) / area2);
   }
-  const std::vector<Eigen::Vector3f>& v = vertices.velocities;
-  return v[a] + point.b1 * (v[b] - v[a]) + point.b2 * (v[c] - v[a]);
+  return at_point(vertices.velocities, triangles_[point.triangle], point);
 }
 
 void complete_deforming(const std::vector<GlDeformingObject>& objects, const GlDeformed& deformed,

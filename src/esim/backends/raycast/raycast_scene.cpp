@@ -56,7 +56,7 @@ RaycastScene::RaycastScene(const Scene& scene, SceneUse use) : lighting_(scene.l
   for (const SceneObject& object : scene.objects) {
     if (!object.moves) continue;
     all.push_back(&object.mesh);
-    if (object.deformation != nullptr) {
+    if (object.deforms()) {
       add_deforming(object);
     } else {
       add_group({&object.mesh});

@@ -23,18 +23,20 @@ void add(const MorphTarget& target, std::size_t first, float weight, float slope
     shape.normals[first + target.vertices[i]] += weight * target.normals[i];
 }
 
+/// The weights of a morph's targets, and their change per second.
+void weights_at(const Morph& morph, double t_s, std::vector<float>& weights, std::vector<float>& slopes) {
+  if (!morph.track.times_s.empty()) return sample_at(morph.track, t_s, morph.targets.size(), weights, slopes);
+  weights = morph.weights;
+  slopes.assign(weights.size(), 0);
+}
+
 void apply(const RestShape& rest, const std::vector<Morph>& morphs, double t_s, MorphedShape& shape) {
   shape.vertices = rest.vertices;
   shape.normals = rest.normals;
   shape.velocities.assign(rest.vertices.size(), Eigen::Vector3f::Zero());
   std::vector<float> weights, slopes;
   for (const Morph& morph : morphs) {
-    if (morph.track.times_s.empty()) {
-      weights = morph.weights;
-      slopes.assign(weights.size(), 0);
-    } else {
-      sample_at(morph.track, t_s, morph.targets.size(), weights, slopes);
-    }
+    weights_at(morph, t_s, weights, slopes);
     for (std::size_t i = 0; i < morph.targets.size(); ++i)
       add(*morph.targets[i], morph.first_vertex, weights[i], slopes[i], shape);
   }
@@ -87,12 +89,26 @@ SkinnedDeformation::SkinnedDeformation(RestShape rest, SkinWeights weights, std:
     for (std::size_t i = weights_.begin_of(vertex); i < weights_.ends[vertex]; ++i)
       moved_by_[weights_.influences[i].joint].extend(rest_.vertices[vertex]);
   }
+  for (const Morph& morph : morphs_) {
+    std::vector<Eigen::Vector3f>& of_targets = reach_.emplace_back();
+    for (const auto& target : morph.targets) {
+      Eigen::Vector3f& reach = of_targets.emplace_back(Eigen::Vector3f::Zero());
+      for (const Eigen::Vector3f& offset : target->positions) reach = reach.cwiseMax(offset.cwiseAbs());
+    }
+  }
 }
 
 Eigen::AlignedBox3f SkinnedDeformation::bounds(TimeNs t) const {
-  if (!morphs_.empty()) return Deformation::bounds(t);
   thread_local std::vector<JointMatrix> matrices;
+  thread_local std::vector<float> weights, slopes;
   joints_.evaluate(to_seconds(t), matrices);
+  Eigen::Vector3f displaced = Eigen::Vector3f::Zero();
+  for (std::size_t m = 0; m < morphs_.size(); ++m) {
+    weights_at(morphs_[m], to_seconds(t), weights, slopes);
+    Eigen::Vector3f of_morph = Eigen::Vector3f::Zero();
+    for (std::size_t k = 0; k < reach_[m].size(); ++k) of_morph += std::fabs(weights[k]) * reach_[m][k];
+    displaced = displaced.cwiseMax(of_morph);  // morphs have vertices of their own
+  }
   Eigen::AlignedBox3f box;
   for (std::size_t joint = 0; joint < moved_by_.size(); ++joint) {
     if (moved_by_[joint].isEmpty()) continue;
@@ -100,7 +116,8 @@ Eigen::AlignedBox3f SkinnedDeformation::bounds(TimeNs t) const {
     const Eigen::Map<const Eigen::Matrix<float, 4, 3>> linear(columns);
     const Eigen::Vector3f middle =
         (times(columns, moved_by_[joint].center()) + Eigen::Map<const Eigen::Vector4f>(columns + 12)).head<3>();
-    const Eigen::Vector3f reach = 0.5F * (linear.topRows<3>().cwiseAbs() * moved_by_[joint].sizes());
+    const Eigen::Vector3f half = 0.5F * moved_by_[joint].sizes() + displaced;
+    const Eigen::Vector3f reach = linear.topRows<3>().cwiseAbs() * half;
     box.extend(middle - reach), box.extend(middle + reach);
   }
   constexpr float kRounding = 1e-5F;  // of single precision

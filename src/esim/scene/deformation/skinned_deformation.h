@@ -40,7 +40,8 @@ class SkinnedDeformation final : public Deformation {
   TimeSpan span() const override { return span_; }
   void evaluate(TimeNs t, DeformedVertices& vertices) const override;
 
-  /// Without morph targets, from the boxes of what each joint moves: a vertex lies between where its joints put it.
+  /// From the boxes of what each joint moves, as far as morph targets may displace it: a vertex lies between where its
+  /// joints put it.
   Eigen::AlignedBox3f bounds(TimeNs t) const override;
 
  private:
@@ -49,7 +50,8 @@ class SkinnedDeformation final : public Deformation {
   std::vector<Morph> morphs_;
   JointMotion joints_;
   TimeSpan span_;
-  std::vector<Eigen::AlignedBox3f> moved_by_;  // per joint, the rest vertices that it influences
+  std::vector<Eigen::AlignedBox3f> moved_by_;        // per joint, the rest vertices that it influences
+  std::vector<std::vector<Eigen::Vector3f>> reach_;  // per morph and target, the largest offsets along the axes
 };
 
 }  // namespace esim::inline scene

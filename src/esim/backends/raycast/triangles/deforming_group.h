@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "esim/backends/raycast/triangles/scene_triangles.h"
-#include "esim/render/sample.h"
+#include "esim/render/surface_point.h"
 #include "esim/scene/scene.h"
 
 // Private to backends/raycast.
@@ -30,9 +30,7 @@ class DeformingGroup {
 
   /// Velocity of a point relative to the object's frame, m/s.
   Eigen::Vector3f velocity(const DeformedGroup& at, const SurfacePoint& point) const {
-    const auto& [a, b, c] = corners_[point.triangle];
-    const std::vector<Eigen::Vector3f>& v = at.vertices.velocities;
-    return v[a] + point.b1 * (v[b] - v[a]) + point.b2 * (v[c] - v[a]);
+    return at_point(at.vertices.velocities, corners_[point.triangle], point);
   }
 
   /// Contains the object at a time.

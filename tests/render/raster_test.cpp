@@ -7,6 +7,7 @@
 #include <limits>
 #include <random>
 
+#include "esim/backends/raycast/raster/clipped_triangles.h"
 #include "esim/core/error.h"
 #include "render/scenes.h"
 
@@ -132,7 +133,8 @@ double searched(const std::vector<Eigen::Vector3f>& corners, const std::vector<f
   return sum / (kGrid * kGrid);
 }
 
-TEST(RasterRenderer, RandomTrianglesAreWhatASlowSearchSees) {
+/// Compares images of random triangles, of which some are behind the camera, with the search.
+void expect_random_triangles(int triangles, double largest, double rms) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> across(-1.2F, 1.2F), depth(-0.5F, 3.0F), albedo(0.0F, 1.0F);
   Camera model = test::distorted_camera(0);
@@ -140,7 +142,7 @@ TEST(RasterRenderer, RandomTrianglesAreWhatASlowSearchSees) {
   for (int mesh = 0; mesh < 40; ++mesh) {
     std::vector<Eigen::Vector3f> corners;
     std::vector<float> albedos;
-    for (int k = 0; k < 12; ++k) {
+    for (int k = 0; k < triangles; ++k) {
       albedos.push_back(albedo(random));
       for (int corner = 0; corner < 3; ++corner) {
         const float z = depth(random);  // also behind the camera: triangles are clipped
@@ -152,11 +154,86 @@ TEST(RasterRenderer, RandomTrianglesAreWhatASlowSearchSees) {
     for (int i = 0; i < 60; ++i) {
       const int x = column(random), y = row(random);
       const double error = static_cast<double>(sample.irradiance(x, y)) - searched(corners, albedos, model, x, y, 0.3);
-      EXPECT_LT(std::abs(error), 0.06) << mesh << ": " << x << ", " << y;
+      EXPECT_LT(std::abs(error), largest) << mesh << ": " << x << ", " << y;
       squares += error * error, ++count;
     }
   }
-  EXPECT_LT(std::sqrt(squares / count), 0.006);
+  EXPECT_LT(std::sqrt(squares / count), rms);
+}
+
+TEST(RasterRenderer, RandomTrianglesAreWhatASlowSearchSees) { expect_random_triangles(12, 0.06, 0.006); }
+
+TEST(RasterRenderer, ManyRandomTrianglesAreWhatASlowSearchSees) { expect_random_triangles(60, 0.12, 0.02); }
+
+TEST(RasterRenderer, ManySmallTrianglesHaveTheOutlineOfTheirSurface) {
+  // The black half-plane in triangles of 0.4 px, of which a pixel sees a dozen.
+  const Camera model = test::distorted_camera(0);
+  int others = 0;
+  for (const double angle : {0.0, 0.3, 0.8, 2.0}) {
+    const double offset = 1.37;
+    const Eigen::Vector2d normal(std::cos(angle), std::sin(angle)), along(-normal.y(), normal.x());
+    std::vector<Eigen::Vector3f> corners;
+    const auto corner = [&](int n, int s) {
+      const Eigen::Vector2d at = (offset - 0.4 * n) * normal + 0.4 * s * along;
+      return Eigen::Vector3f(static_cast<float>(at.x() / model.fx), static_cast<float>(at.y() / model.fy), 1.0F);
+    };
+    for (int n = 0; n < 12; ++n) {
+      for (int s = -40; s < 40; ++s) {
+        for (const auto& c : {corner(n, s), corner(n + 1, s), corner(n + 1, s + 1), corner(n, s), corner(n, s + 1),
+                              corner(n + 1, s + 1)})
+          corners.push_back(c);
+      }
+    }
+    const Sample sample = seen(plain_scene(corners, std::vector<float>(corners.size() / 3, 0.0F)), model);
+    for (int y = 0; y < model.height; ++y) {
+      for (int x = 0; x < model.width; ++x) {
+        const Eigen::Vector2d at(x - model.cx, y - model.cy);
+        if (std::abs(at.dot(along)) > 14 || at.dot(normal) < offset - 4) continue;
+        const double error = sample.irradiance(x, y) - white_area(at.x(), at.y(), angle, offset);
+        // The last sample of either side decides whether it is seen at all.
+        EXPECT_LT(std::abs(error), 1.0 / 64) << x << ", " << y << " at " << angle;
+        others += std::abs(error) > 1e-4 ? 1 : 0;
+      }
+    }
+  }
+  EXPECT_LT(others, 10);
+}
+
+TEST(ClippedTriangles, AreWhatAPolygonIsCutDownTo) {
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> at(-1.2F, 1.2F);
+  ClippedTriangles triangles;
+  for (const float size : {0.3F, 1.0F, 8.0F, 300.0F}) {
+    for (int i = 0; i < 2000; ++i) {
+      for (std::size_t corner = 0; corner < 3; ++corner) {
+        for (std::size_t lane = 0; lane < ClippedTriangles::kCount; ++lane)
+          triangles.s[corner][lane] = size * at(random), triangles.t[corner][lane] = size * at(random);
+      }
+      if (i % 3 == 0) triangles.t[1] = triangles.t[0];  // sides along rows and columns
+      if (i % 5 == 0) triangles.s[2] = triangles.s[1];
+      triangles.integrate();
+      for (std::size_t lane = 0; lane < ClippedTriangles::kCount; ++lane) {
+        const auto s = [&](std::size_t corner) { return triangles.s[corner % 3][lane]; };
+        const auto t = [&](std::size_t corner) { return triangles.t[corner % 3][lane]; };
+        const float side = (s(1) - s(0)) * (t(2) - t(0)) - (t(1) - t(0)) * (s(2) - s(0)) < 0 ? -1.0F : 1.0F;
+        Convex polygon = Convex::pixel(), rest;
+        for (std::size_t corner = 0; corner < 3 && !polygon.empty(); ++corner) {
+          const float ds = side * (s(corner + 1) - s(corner)), dt = side * (t(corner + 1) - t(corner));
+          polygon.cut({dt * s(corner) - ds * t(corner), -dt, ds}, rest);
+        }
+        Moments expected;
+        if (!polygon.empty()) polygon.integrate(expected);
+        const Moments actual = triangles.moments(lane);
+        const float tolerance = 2e-6F * std::max(size, 1.0F);
+        ASSERT_NEAR(actual.area, expected.area, tolerance);
+        ASSERT_NEAR(actual.s, expected.s, tolerance);
+        ASSERT_NEAR(actual.t, expected.t, tolerance);
+        ASSERT_NEAR(actual.ss, expected.ss, tolerance);
+        ASSERT_NEAR(actual.st, expected.st, tolerance);
+        ASSERT_NEAR(actual.tt, expected.tt, tolerance);
+      }
+    }
+  }
 }
 
 TEST(RasterRenderer, NoSurfaceShowsTheTextureBesideIt) {

@@ -34,6 +34,13 @@ struct OfPixel {
 struct Moments {
   float area = 0, s = 0, t = 0, ss = 0, st = 0, tt = 0;  ///< of 1, of the position, and of its products
 
+  static Moments pixel() { return {1, 0, 0, 1.0F / 12, 0, 1.0F / 12}; }
+
+  Moments& operator-=(const Moments& other) {
+    area -= other.area, s -= other.s, t -= other.t, ss -= other.ss, st -= other.st, tt -= other.tt;
+    return *this;
+  }
+  void scale(float factor) { area *= factor, s *= factor, t *= factor, ss *= factor, st *= factor, tt *= factor; }
   void add(float weight, float at_s, float at_t) { area += weight, s += weight * at_s, t += weight * at_t; }
   void add_products(float weight, float at_s, float at_t) {
     ss += weight * at_s * at_s, st += weight * at_s * at_t, tt += weight * at_t * at_t;

@@ -3,7 +3,11 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <functional>
+#include <limits>
 #include <utility>
+
+#include "esim/backends/raycast/sample_places.h"
 
 namespace esim::inline backends::inline raycast {
 namespace {
@@ -13,6 +17,17 @@ constexpr float kTouch = 1e-4F;         // px; what overlaps by less touches onl
 constexpr float kSameDepth = 2e-6F;     // relative; surfaces at the same depth: the first one is visible
 constexpr std::size_t kMaxPieces = 24;  // of a fragment, or of what is left of a pixel
 constexpr std::size_t kMaxCuts = 5;     // of a piece by a surface
+constexpr float kFarCorner = 500;       // px; a corner farther away is not exact enough
+
+using D = hn::CappedTag<float, 8>;
+constexpr std::size_t kVector = hn::MaxLanes(D());
+
+template <class Mask>
+unsigned bits_of(Mask mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(D(), mask, bits);
+  return bits[0];
+}
 
 Fragment fragment_of(std::uint32_t triangle, std::uint16_t pixel, const Moments& sum) {
   const float s = sum.s / sum.area, t = sum.t / sum.area;
@@ -25,12 +40,10 @@ Fragment fragment_of(std::uint32_t triangle, std::uint16_t pixel, const Moments&
 
 }  // namespace
 
-Coverage::Coverage(std::span<const Eigen::Vector2f> places, bool store_samples)
-    : store_samples_(store_samples), every_sample_(~std::uint64_t{0} >> (64 - places.size())) {
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    samples_.push_back({places[i].x(), places[i].y()});
-    s_[i] = samples_[i].s, t_[i] = samples_[i].t;
-  }
+PixelSamples::PixelSamples(int samples_per_pixel) {
+  const std::vector<Eigen::Vector2f> places = sample_places(samples_per_pixel);
+  count = places.size(), all = ~std::uint64_t{0} >> (kMax - count);
+  for (std::size_t i = 0; i < count; ++i) s[i] = places[i].x(), t[i] = places[i].y();
 }
 
 SeenInMiddle Coverage::divide(const CellSurfaces& surfaces, const ImageCell& cell, int pixel,
@@ -40,30 +53,30 @@ SeenInMiddle Coverage::divide(const CellSurfaces& surfaces, const ImageCell& cel
   const auto k = static_cast<std::size_t>(pixel);
   if (found.size() == 1 && found[0].fills_pixel != 0) {
     const ScreenTriangle& triangle = surfaces.triangle(found[0].triangle);
-    fragments.push_back({found[0].triangle, static_cast<std::uint16_t>(pixel), {0, 0}, {}, 1, every_sample_});
+    fragments.push_back({found[0].triangle, static_cast<std::uint16_t>(pixel), {0, 0}, {}, 1, samples_.shadows.all});
     return {triangle.inverse_depth().at(cell.x[k], cell.y[k]), triangle.group, found[0].triangle};
   }
-  surfaces_ = &surfaces, cell_ = &cell, pixel_ = static_cast<std::uint16_t>(pixel);
-  candidates_.clear();
-  found_ = found;
-  order_.clear();
-  for (std::size_t i = 0; i < found.size(); ++i) {
-    // Positive numbers have the order of their bits.
-    const std::uint64_t key = std::uint64_t{std::bit_cast<std::uint32_t>(found[i].nearest)} << 32 | i;
-    std::size_t at = order_.size();
-    order_.push_back(key);
-    for (; at > 0 && order_[at - 1] < key; --at) order_[at] = order_[at - 1];
-    order_[at] = key;
-  }
+  surfaces_ = &surfaces, cell_ = &cell, pixel_ = static_cast<std::uint16_t>(pixel), found_ = found;
+  put_in_order();
   const std::size_t before = fragments.size();
-  const bool exact = samples_.size() > 1 && divide_exactly(fragments);
-  if (!exact || store_samples_) look_at_samples();
-  if (!exact) {
+  if (dense_.count == 1 || order_.size() > kMaxExact || !divide_exactly(fragments)) {
     fragments.resize(before);
     divide_by_samples(fragments);
   }
-  if (store_samples_) store_samples(std::span(fragments).subspan(before));
+  if (for_shadows_) store_samples(std::span(fragments).subspan(before));
   return look_at_middle();
+}
+
+/// The nearest one first.
+void Coverage::put_in_order() {
+  candidates_.clear();
+  candidates_.reserve(found_.size());  // so that references to its elements remain valid
+  order_.clear();
+  for (std::size_t i = 0; i < found_.size(); ++i) {
+    // Positive numbers have the order of their bits.
+    order_.push_back(std::uint64_t{std::bit_cast<std::uint32_t>(found_[i].nearest)} << 32 | i);
+  }
+  std::ranges::sort(order_, std::greater());
 }
 
 float Coverage::nearest(std::size_t candidate) const {
@@ -98,7 +111,7 @@ const Coverage::Local& Coverage::local(std::size_t candidate) {
 
 SeenInMiddle Coverage::look_at_middle() {
   SeenInMiddle seen;
-  std::uint32_t index = kNone;
+  std::uint32_t index = ~0U;
   for (std::size_t i = 0; i < order_.size() && nearest(i) >= seen.inverse_depth; ++i) {
     const Local& local = this->local(i);
     const float z = local.middle[3];
@@ -114,9 +127,7 @@ SeenInMiddle Coverage::look_at_middle() {
 /// takes too many polygons.
 bool Coverage::divide_exactly(std::vector<Fragment>& fragments) {
   left_.assign(1, Convex::pixel());
-  candidates_.reserve(order_.size());  // so that references to its elements remain valid
   for (std::size_t i = 0; i < order_.size() && !left_.empty(); ++i) {
-    if (i == kMaxExact) return false;
     Moments sum;
     if (i + 1 == order_.size() && found(i).fills_pixel != 0) {
       for (const Convex& piece : left_) piece.integrate(sum);
@@ -148,7 +159,6 @@ bool Coverage::take(Convex& piece, std::size_t candidate) {
   visible_.push_back(piece);
   // Surfaces are in the order of their nearest points, so that one after this may be in front of it elsewhere.
   for (std::size_t i = candidate + 1; i < order_.size() && nearest(i) >= surface.farthest; ++i) {
-    if (i == kMaxExact) return false;
     const Local& other = local(i);
     if (!other.outside && other.nearest >= surface.farthest && !hide(surface, other)) return false;
   }
@@ -216,54 +226,167 @@ bool Coverage::hide(const Local& surface, const Local& other) {
   return visible_.size() <= kMaxPieces;
 }
 
-/// Finds what each sample sees.
-void Coverage::look_at_samples() {
-  const std::size_t count = samples_.size();
-  alignas(64) std::array<float, kMaxSamples> depth;
-  alignas(64) std::array<std::uint32_t, kMaxSamples> index;
-  for (std::size_t i = 0; i < count; ++i) depth[i] = 0, index[i] = kNone, seen_[i] = kNone;
-  for (std::size_t c = 0; c < order_.size(); ++c) {
+/// Finds which samples are in each candidate, and which of them see it. Candidates behind all samples are left out.
+void Coverage::look_at(const PixelSamples& samples) {
+  const D d;
+  const auto zero = hn::Zero(d), max = hn::Set(d, kMaxInverseDepth);
+  alignas(64) std::array<float, PixelSamples::kMax> depth;
+  const std::size_t count = (samples.count + kVector - 1) / kVector * kVector;
+  for (std::size_t i = 0; i < count; i += kVector) hn::Store(zero, d, &depth[i]);
+  covered_.clear(), visible_at_.clear();
+  float farthest_seen = 0;
+  for (std::size_t c = 0; c < order_.size() && nearest(c) >= farthest_seen; ++c) {
     const Local& local = this->local(c);
-    const OfPixel w0 = local.function(0), w1 = local.function(1), w2 = local.function(2);
-    const OfPixel z = local.inverse_depth();
-    const std::uint32_t local_index = local.index, id = static_cast<std::uint32_t>(c);
-#pragma omp simd
-    for (std::size_t i = 0; i < count; ++i) {
-      const float s = s_[i], t = t_[i];
-      const float a = w0.middle + w0.s * s + w0.t * t, b = w1.middle + w1.s * s + w1.t * t;
-      const float e = w2.middle + w2.s * s + w2.t * t, at = z.middle + z.s * s + z.t * t;
-      const bool inside = (a >= 0) & (b >= 0) & (e >= 0) & (at > 0) & (at <= kMaxInverseDepth);
-      const bool nearer = inside & ((at > depth[i]) | ((at == depth[i]) & (local_index < index[i])));
-      depth[i] = nearer ? at : depth[i];
-      index[i] = nearer ? local_index : index[i];
-      seen_[i] = nearer ? id : seen_[i];
+    covered_.push_back(0), visible_at_.push_back(0);
+    if (local.outside) continue;
+    const auto of = [&](std::size_t k, auto s, auto t) {
+      return hn::MulAdd(hn::Set(d, local.s[k]), s, hn::MulAdd(hn::Set(d, local.t[k]), t, hn::Set(d, local.middle[k])));
+    };
+    std::uint64_t covered = 0, nearer = 0, equal = 0;
+    auto farthest = max;
+    for (std::size_t i = 0; i < count; i += kVector) {
+      const auto s = hn::Load(d, &samples.s[i]), t = hn::Load(d, &samples.t[i]);
+      const auto z = of(3, s, t), before = hn::Load(d, &depth[i]);
+      const auto weight = hn::Min(hn::Min(of(0, s, t), of(1, s, t)), of(2, s, t));
+      const auto inside = hn::And(hn::Ge(weight, zero), hn::And(hn::Gt(z, zero), hn::Le(z, max)));
+      const auto now = hn::IfThenElse(inside, hn::Max(z, before), before);
+      hn::Store(now, d, &depth[i]);
+      farthest = hn::Min(farthest, now);
+      covered |= std::uint64_t{bits_of(inside)} << i;
+      nearer |= std::uint64_t{bits_of(hn::Gt(z, before))} << i;
+      equal |= std::uint64_t{bits_of(hn::Eq(z, before))} << i;
     }
+    covered &= samples.all;
+    std::uint64_t visible = covered & nearer;
+    for (std::size_t other = 0; other < c; ++other) {
+      if (local.index < candidates_[other].index) visible |= covered & equal & visible_at_[other];
+      visible_at_[other] &= ~visible;
+    }
+    covered_[c] = covered, visible_at_[c] = visible;
+    farthest_seen = hn::GetLane(hn::MinOfLanes(d, farthest));
   }
 }
 
+/// Makes fragments of what the samples see. A surface that they see wherever they meet it is measured exactly; the
+/// others share what is left.
 void Coverage::divide_by_samples(std::vector<Fragment>& fragments) {
-  // Each sample stands for a square of its part of the pixel.
-  const std::size_t count = samples_.size();
-  const float part = 1 / static_cast<float>(count);
-  std::vector<Moments> sums(candidates_.size());
-  for (std::size_t i = 0; i < count; ++i) {
-    if (seen_[i] == kNone) continue;
-    Moments& sum = sums[seen_[i]];
-    sum.add(part, s_[i], t_[i]), sum.add_products(part, s_[i], t_[i]);
-    sum.ss += part * part / 12, sum.tt += part * part / 12;
+  look_at(dense_);
+  parts_.clear();
+  std::uint64_t background = dense_.all, others = dense_.all;  // samples that see no surface, or no whole part
+  int partial = 0;
+  for (std::uint32_t c = 0; c < covered_.size(); ++c) {
+    const std::uint64_t visible_at = visible_at_[c];
+    if (visible_at == 0) continue;
+    const bool whole = visible_at == covered_[c] && dense_.count > 1;
+    parts_.push_back({c, visible_at, whole, {}});
+    background &= ~visible_at;
+    if (whole) others &= ~visible_at;
+    if (!whole) ++partial;
   }
-  for (std::size_t c = 0; c < candidates_.size(); ++c) {
-    if (sums[c].area > 0) fragments.push_back(fragment_of(candidates_[c].triangle, pixel_, sums[c]));
+  clip_whole_parts(0);
+  const bool is_outline = partial + (background != 0 ? 1 : 0) == 1;  // in front of one other surface
+  if (is_outline && others != dense_.all) add_neighbours();
+  Moments left = Moments::pixel();
+  for (const Part& part : parts_) {
+    if (part.whole) left -= part.moments;
   }
+  const bool is_full = others == 0 || left.area < 0;
+  for (const Part& part : parts_) {
+    Moments sum = part.moments;
+    if (part.whole) {
+      if (is_full) sum.scale(1 / (1 - left.area));
+    } else if (is_full) {
+      continue;
+    } else if (is_outline) {
+      sum = left;
+    } else {
+      sum = moments_of_samples(part.visible_at);
+      sum.scale(left.area * static_cast<float>(dense_.count) / static_cast<float>(std::popcount(others)));
+    }
+    if (sum.area > kSmallestArea) fragments.push_back(fragment_of(found(part.candidate).triangle, pixel_, sum));
+  }
+}
+
+/// Adds the candidates between samples that continue a whole part beyond one of its sides. Without them, the outline of
+/// a surface of small triangles would not be exact.
+void Coverage::add_neighbours() {
+  std::size_t kept = parts_.size();
+  for (std::uint32_t c = 0; c < covered_.size(); ++c) {
+    if (covered_[c] == 0 && !candidates_[c].outside) parts_.push_back({c, 0, true, {}});
+  }
+  clip_whole_parts(kept);
+  const auto triangle = [&](const Part& part) -> const ScreenTriangle& {
+    return surfaces_->triangle(found(part.candidate).triangle);
+  };
+  for (std::size_t kept_before = 0; kept_before != kept;) {
+    kept_before = kept;
+    for (std::size_t i = kept; i < parts_.size(); ++i) {
+      const auto continues = [&](const Part& part) {
+        return part.whole && triangle(part).is_neighbour(triangle(parts_[i]));
+      };
+      const bool is_visible =
+          parts_[i].moments.area > kSmallestArea && std::ranges::any_of(std::span(parts_).first(kept), continues);
+      if (is_visible) std::swap(parts_[i], parts_[kept++]);
+    }
+  }
+  parts_.resize(kept);
+}
+
+/// Each sample stands for a square of its part of the pixel.
+Moments Coverage::moments_of_samples(std::uint64_t samples) const {
+  const float part = 1 / static_cast<float>(dense_.count);
+  Moments sum;
+  for (; samples != 0; samples &= samples - 1) {
+    const auto i = static_cast<std::size_t>(std::countr_zero(samples));
+    sum.add(part, dense_.s[i], dense_.t[i]), sum.add_products(part, dense_.s[i], dense_.t[i]);
+  }
+  sum.ss += sum.area * part / 12, sum.tt += sum.area * part / 12;
+  return sum;
+}
+
+/// Computes the moments of the whole parts, from the `first` part on.
+void Coverage::clip_whole_parts(std::size_t first) {
+  const std::size_t k = pixel_;
+  const float x = cell_->x[k], y = cell_->y[k];
+  const float per_det = 1 / (cell_->dx_du[k] * cell_->dy_dv[k] - cell_->dx_dv[k] * cell_->dy_du[k]);
+  const float s_x = cell_->dy_dv[k] * per_det, s_y = -cell_->dx_dv[k] * per_det;
+  const float t_x = -cell_->dy_du[k] * per_det, t_y = cell_->dx_du[k] * per_det;
+  std::array<Part*, ClippedTriangles::kCount> lanes;
+  std::size_t used = 0;
+  const auto flush = [&] {
+    clipped_.integrate();
+    for (std::size_t lane = 0; lane < used; ++lane) lanes[lane]->moments = clipped_.moments(lane);
+    used = 0;
+  };
+  for (Part& part : std::span(parts_).subspan(first)) {
+    if (!part.whole) continue;
+    const ScreenTriangle& triangle = surfaces_->triangle(found(part.candidate).triangle);
+    float farthest = triangle.nearest <= kMaxInverseDepth ? 0 : std::numeric_limits<float>::infinity();
+    for (std::size_t c = 0; c < 3; ++c) {
+      const float dx = triangle.corner_x[c] - x, dy = triangle.corner_y[c] - y;
+      const float s = s_x * dx + s_y * dy, t = t_x * dx + t_y * dy;
+      clipped_.s[c][used] = s, clipped_.t[c][used] = t;
+      farthest = std::max(farthest, std::max(std::fabs(s), std::fabs(t)));
+    }
+    if (!(farthest < kFarCorner)) {
+      Convex piece = Convex::pixel();
+      remaining_.clear();
+      keep_covered(piece, local(part.candidate), remaining_);
+      if (!piece.empty()) piece.integrate(part.moments);
+      continue;
+    }
+    lanes[used] = &part;
+    if (++used == ClippedTriangles::kCount) flush();
+  }
+  if (used > 0) flush();
 }
 
 /// Fragments between samples have none.
 void Coverage::store_samples(std::span<Fragment> fragments) {
+  look_at(samples_.shadows);
   for (Fragment& fragment : fragments) {
-    for (std::size_t i = 0; i < samples_.size(); ++i) {
-      if (seen_[i] != kNone && candidates_[seen_[i]].triangle == fragment.triangle)
-        fragment.samples |= std::uint64_t{1} << i;
-    }
+    for (std::size_t c = 0; c < covered_.size(); ++c)
+      if (found(c).triangle == fragment.triangle) fragment.samples |= visible_at_[c];
   }
 }
 

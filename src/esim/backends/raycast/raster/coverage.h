@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "esim/backends/raycast/raster/cell_surfaces.h"
+#include "esim/backends/raycast/raster/clipped_triangles.h"
 #include "esim/backends/raycast/raster/convex.h"
 
 // Private to backends/raycast.
@@ -27,7 +28,7 @@ struct Fragment {
   PixelPoint centroid;
   Spread spread;
   float area;               ///< fraction of the pixel
-  std::uint64_t samples{};  ///< a bit for each position at which it is visible, if requested
+  std::uint64_t samples{};  ///< a bit for each sample for shadows at which it is visible, if requested
 };
 
 /// What is seen in the middle of a pixel.
@@ -37,20 +38,44 @@ struct SeenInMiddle {
   std::uint32_t triangle = 0;  ///< of the cell's
 };
 
+/// Positions in a pixel.
+struct PixelSamples {
+  static constexpr std::size_t kMax = 64;
+
+  /// 1, 16 or 64 of them; throws UserError otherwise.
+  explicit PixelSamples(int samples_per_pixel);
+
+  PixelPoint operator[](std::size_t i) const { return {s[i], t[i]}; }
+
+  std::size_t count;
+  std::uint64_t all;  ///< a bit for each of them
+  alignas(64) std::array<float, kMax> s{}, t{};
+};
+
+/// The samples of Coverage.
+struct CoverageSamples {
+  /// `samples_per_pixel`: 1, 16 or 64; with 1, a pixel shows what its centre sees. Throws UserError otherwise.
+  explicit CoverageSamples(int samples_per_pixel)
+      : shadows(samples_per_pixel), visibility(samples_per_pixel == 1 ? 1 : PixelSamples::kMax) {}
+
+  PixelSamples shadows;     ///< where shadows are tested
+  PixelSamples visibility;  ///< where visibility is tested if many triangles may be visible
+};
+
 /// Divides a pixel among the triangles that are visible in it.
 class Coverage {
  public:
-  /// More triangles are tested at sample positions.
-  static constexpr std::size_t kMaxExact = 24;
+  /// If there are more triangles, samples tell which of them are visible.
+  static constexpr std::size_t kMaxExact = 8;
 
-  /// `places` of samples in a pixel, at most 64. `store_samples`: of fragments.
-  Coverage(std::span<const Eigen::Vector2f> places, bool store_samples);
+  /// `for_shadows`: fragments contain the samples for shadows.
+  Coverage(const CoverageSamples& samples, bool for_shadows)
+      : samples_(samples), dense_(samples.visibility), for_shadows_(for_shadows) {}
 
-  /// Appends the fragments of a pixel. The sum of their areas is 1 if no background is visible. Areas are exact if
-  /// there are few candidates and several samples, and multiples of 1 / samples otherwise.
+  /// Appends the fragments of a pixel. The sum of their areas is 1 if no background is visible. If there are many
+  /// candidates, parts below 1/64 of the pixel may be missed; areas are exact for surfaces of which nothing is hidden,
+  /// and for a single one behind them, and multiples of 1/64 for others.
   SeenInMiddle divide(const CellSurfaces& surfaces, const ImageCell& cell, int pixel, std::vector<Fragment>& fragments);
-
-  std::span<const PixelPoint> samples() const { return samples_; }
 
  private:
   /// A candidate in the pixel's coordinates.
@@ -66,37 +91,47 @@ class Coverage {
     OfPixel inverse_depth() const { return function(3); }
   };
 
+  /// What samples see of a candidate.
+  struct Part {
+    std::uint32_t candidate;
+    std::uint64_t visible_at;  // these samples
+    bool whole;                // they are all that it covers, which may be none
+    Moments moments;           // of what it covers, if it is whole
+  };
+
   const Candidate& found(std::size_t candidate) const { return found_[order_[candidate] & 0xffffffffU]; }
   float nearest(std::size_t candidate) const;
   const Local& local(std::size_t candidate);
+  void put_in_order();
   SeenInMiddle look_at_middle();
   bool divide_exactly(std::vector<Fragment>& fragments);
   bool take(Convex& piece, std::size_t candidate);
   static bool is_apart(const Convex& piece, const Local& surface);
   static bool keep_covered(Convex& piece, const Local& surface, std::vector<Convex>& rests);
   bool hide(const Local& surface, const Local& other);
-  void look_at_samples();
+  void look_at(const PixelSamples& samples);
   void divide_by_samples(std::vector<Fragment>& fragments);
+  void clip_whole_parts(std::size_t first);
+  void add_neighbours();
+  Moments moments_of_samples(std::uint64_t samples) const;
   void store_samples(std::span<Fragment> fragments);
 
-  static constexpr std::size_t kMaxSamples = 64;
-  static constexpr std::uint32_t kNone = ~0U;
-
-  std::vector<PixelPoint> samples_;
-  bool store_samples_;
-  std::uint64_t every_sample_;
-  alignas(64) std::array<float, kMaxSamples> s_, t_;
-  std::array<std::uint32_t, kMaxSamples> seen_;  // the candidate that is visible at each sample
+  const CoverageSamples& samples_;
+  const PixelSamples& dense_;
+  bool for_shadows_;
   // Of the current pixel.
   const CellSurfaces* surfaces_;
   const ImageCell* cell_;
   std::uint16_t pixel_;
   std::span<const Candidate> found_;
-  std::vector<std::uint64_t> order_;  // the nearest first: inverse depth, and the place in found_
-  std::vector<Local> candidates_;     // the first of these
-  std::vector<Convex> left_;          // of the pixel, for the next candidate
-  std::vector<Convex> visible_;       // what a candidate takes of a piece
-  std::vector<Convex> remaining_;     // what it leaves
+  std::vector<std::uint64_t> order_;                 // the nearest first: inverse depth, and the place in found_
+  std::vector<Local> candidates_;                    // the first of these
+  std::vector<std::uint64_t> covered_, visible_at_;  // samples in each of these, and samples that see it
+  std::vector<Part> parts_;
+  ClippedTriangles clipped_;
+  std::vector<Convex> left_;       // of the pixel, for the next candidate
+  std::vector<Convex> visible_;    // what a candidate takes of a piece
+  std::vector<Convex> remaining_;  // what it leaves
 };
 
 }  // namespace esim::inline backends::inline raycast

@@ -19,7 +19,7 @@ class FragmentShading {
  public:
   /// `side` of the square that edges are averaged over, in footprints; `samples`: positions at which shadows are
   /// tested in a pixel that the edge of a shadow crosses. All arguments must outlive it.
-  FragmentShading(const RaycastScene& scene, const Moment& moment, float side, std::span<const PixelPoint> samples)
+  FragmentShading(const RaycastScene& scene, const Moment& moment, float side, const PixelSamples& samples)
       : scene_(scene), moment_(moment), shading_(scene, 0), side_(side), samples_(samples), batch_(kBatch) {}
 
   /// `mosaic`: each pixel sees the materials in the colour of its filter.
@@ -185,7 +185,7 @@ class FragmentShading {
   const Moment& moment_;
   Shading shading_;
   float side_;
-  std::span<const PixelPoint> samples_;
+  const PixelSamples& samples_;
   std::vector<Work> batch_;
   GroupRotations<K> rotations_;
 

@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "esim/backends/raycast/raster/fragment_shading.h"
-#include "esim/backends/raycast/sample_places.h"
 #include "esim/render/bands.h"
 
 namespace esim::inline backends::inline raycast {
@@ -18,7 +17,7 @@ class RasterRenderer final : public ProcessorRenderer {
                  const Workers& workers, ColourFilters filters, const PixelArea& area)
       : scene_(std::move(scene)),
         background_(options.background),
-        places_(sample_places(options.samples_per_pixel)),
+        samples_(options.samples_per_pixel),
         side_(static_cast<float>(area.edges) / static_cast<float>(area.texture)),
         rays_(camera, area.texture),
         cells_(rays_, side_),
@@ -84,8 +83,8 @@ class RasterRenderer final : public ProcessorRenderer {
     constexpr int kWidth = ImageCell::kWidth, kHeight = ImageCell::kHeight;
     CellSurfaces surfaces;
     const bool shadows = moment.lighting && moment.lighting->shadows;
-    Coverage coverage(places_, shadows);
-    FragmentShading<K> shading(*scene_, moment, side_, coverage.samples());
+    Coverage coverage(samples_, shadows);
+    FragmentShading<K> shading(*scene_, moment, side_, samples_.shadows);
     std::vector<Fragment> fragments;
     for (int top = band.y / kHeight * kHeight; top < band.y + band.height; top += kHeight) {
       for (int left = band.x / kWidth * kWidth; left < band.x + band.width; left += kWidth) {
@@ -138,8 +137,8 @@ class RasterRenderer final : public ProcessorRenderer {
 
   std::shared_ptr<const RaycastScene> scene_;
   float background_;
-  std::vector<Eigen::Vector2f> places_;  // of samples in a pixel
-  float side_;                           // of the square that edges are averaged over, in footprints
+  CoverageSamples samples_;
+  float side_;  // of the square that edges are averaged over, in footprints
   PixelRays rays_;
   ImageCells cells_;
   const Workers& workers_;

@@ -85,6 +85,8 @@ void ScreenLeaf::project(const TriangleTree::Leaf& leaf, const Eigen::Matrix3f& 
     right[i] = in_front ? r + kRounding * (1 + std::fabs(r)) : kInfinity;
     top[i] = in_front ? t - kRounding * (1 + std::fabs(t)) : -kInfinity;
     bottom[i] = in_front ? b + kRounding * (1 + std::fabs(b)) : kInfinity;
+    corner_x[0][i] = x0, corner_x[1][i] = x1, corner_x[2][i] = x2;
+    corner_y[0][i] = y0, corner_y[1][i] = y1, corner_y[2][i] = y2;
     usable[i] = max_z > kNearestDepth ? usable[i] : 0.0F;
 
     const float ax = leaf.corner[1][0][i] - leaf.corner[0][0][i], bx = leaf.corner[2][0][i] - leaf.corner[0][0][i];
@@ -102,6 +104,7 @@ ScreenTriangle ScreenLeaf::triangle(std::size_t lane) const {
     out.x[k] = weight[k][0][lane], out.y[k] = weight[k][1][lane], out.one[k] = weight[k][2][lane];
   out.x[3] = inverse_depth[0][lane], out.y[3] = inverse_depth[1][lane], out.one[3] = inverse_depth[2][lane];
   out.farthest = farthest[lane], out.nearest = nearest[lane];
+  for (std::size_t k = 0; k < 3; ++k) out.corner_x[k] = corner_x[k][lane], out.corner_y[k] = corner_y[k][lane];
   out.normal = {normal[0][lane], normal[1][lane], normal[2][lane]};
   return out;
 }

@@ -27,10 +27,35 @@ struct OfBearing {
 struct ScreenTriangle {
   // Coefficients of its linear functions of the bearing: of the three weights, and of the inverse depth.
   alignas(16) std::array<float, 4> x, y, one;
-  float farthest, nearest;      ///< bounds of the inverse depth on the triangle
-  std::array<float, 3> normal;  ///< (p1 - p0) x (p2 - p0) in the frame of its group
-  std::uint32_t group;          ///< of the scene
-  std::uint32_t index;          ///< in the scene
+  float farthest, nearest;  ///< bounds of the inverse depth on the triangle; infinite if it is partly too close
+  std::array<float, 3> corner_x, corner_y;  ///< bearings of its corners, if it is not too close
+  std::array<float, 3> normal;              ///< (p1 - p0) x (p2 - p0) in the frame of its group
+  std::uint32_t group;                      ///< of the scene
+  std::uint32_t index;                      ///< in the scene
+
+  /// Whether both have a side in common, and lie on different sides of it in the image.
+  bool is_neighbour(const ScreenTriangle& other) const {
+    if (group != other.group) return false;
+    for (std::size_t k = 0; k < 3; ++k) {
+      // The side opposite corner k, in both directions.
+      const std::size_t a = (k + 1) % 3, b = (k + 2) % 3;
+      for (std::size_t l = 0; l < 3; ++l) {
+        const std::size_t c = (l + 1) % 3, d = (l + 2) % 3;
+        if ((has_corner(a, other, c) && has_corner(b, other, d)) ||
+            (has_corner(a, other, d) && has_corner(b, other, c)))
+          return (side(a, b, *this, k) < 0) != (side(a, b, other, l) < 0);
+      }
+    }
+    return false;
+  }
+  bool has_corner(std::size_t k, const ScreenTriangle& other, std::size_t corner) const {
+    return corner_x[k] == other.corner_x[corner] && corner_y[k] == other.corner_y[corner];
+  }
+  /// On which side of the line from corner a to corner b a corner is.
+  float side(std::size_t a, std::size_t b, const ScreenTriangle& other, std::size_t corner) const {
+    const float dx = other.corner_x[corner] - corner_x[a], dy = other.corner_y[corner] - corner_y[a];
+    return (corner_x[b] - corner_x[a]) * dy - (corner_y[b] - corner_y[a]) * dx;
+  }
 
   OfBearing weight(std::size_t k) const { return {x[k], y[k], one[k]}; }
   OfBearing inverse_depth() const { return {x[3], y[3], one[3]}; }
@@ -49,7 +74,7 @@ struct ScreenLeaf {
   using Lanes = TriangleTree::Lanes;
 
   alignas(64) std::array<std::array<Lanes, 3>, 3> weight;
-  alignas(64) std::array<Lanes, 3> inverse_depth, normal;
+  alignas(64) std::array<Lanes, 3> inverse_depth, normal, corner_x, corner_y;
   alignas(64) Lanes left, right, top,
       bottom;                           ///< bounds of their bearings; infinite if one is partly behind the camera
   alignas(64) Lanes farthest, nearest;  ///< bounds of their inverse depths

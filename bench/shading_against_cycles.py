@@ -328,18 +328,19 @@ def main():
         if not cases:
             return
         references = seen_by_cycles(folder, cases, arguments.samples)
-        print("| light | material | roughness | as it is | same term | mean radiance, esim / Cycles |")
-        print("|---|---|---|---|---|---|")
+        print("| light | material | roughness | as it is | same term | same term, of the rms radiance | mean radiance, esim / Cycles |")
+        print("|---|---|---|---|---|---|---|")
         for i in range(0, len(cases), 2):
             case = cases[i]
             ours = seen_by_esim(arguments.build / "bench/render_irradiance", folder, case["light"], case["metallic"],
                                 case["roughness"])[seen]
             errors = [math.sqrt(np.mean((ours - other[seen]) ** 2)) / np.mean(other[seen]) * 100
                       for other in references[i:i + 2]]
+            relative = np.linalg.norm(ours - references[i + 1][seen]) / np.linalg.norm(references[i + 1][seen]) * 100
             ratio = np.mean(ours) / np.mean(references[i + 1][seen])
             kind = "metal" if case["metallic"] else "dielectric"
             print(f"| {case['light']} | {kind} | {case['roughness']} | {errors[0]:.2f} % | {errors[1]:.2f} % | "
-                  f"{ratio:.4f} |")
+                  f"{relative:.2f} % | {ratio:.4f} |")
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@
 
 #include "esim/backends/raycast/raster/convex.h"
 
-// Private to backends/raycast: includes hwy/highway.h.
+// Private to .cpp files: includes hwy/highway.h.
 namespace esim::inline backends::inline raycast {
 
 /// Triangles in the coordinates of a pixel (see PixelPoint), and the integrals over their parts in the pixel. Their

@@ -10,7 +10,7 @@
 #include <cstdint>
 #include <utility>
 
-// Private to backends/raycast: includes hwy/highway.h.
+// Private to .cpp files: includes hwy/highway.h.
 namespace esim::inline backends::inline raycast {
 
 namespace hn = hwy::HWY_NAMESPACE;

@@ -95,7 +95,7 @@ class Coverage {
   struct Part {
     std::uint32_t candidate;
     std::uint64_t visible_at;  // these samples
-    bool whole;                // they are all that it covers, which may be none
+    bool whole;                // all that it covers; without any, it lies between samples
     Moments moments;           // of what it covers, if it is whole
   };
 

@@ -1,7 +1,8 @@
 """Meshes that deform, as Blender evaluates them: skeletons and shape keys with linear, cubic and step keys, exported by
 Blender's glTF exporter, compared at 101 frames with the vertices of the original scene, and of the import of the GLB.
 
-Scenes with modifiers are read as .blend files, through esim's own export.
+Scenes with modifiers are read as .blend files, through esim's own export, and as the caches of vertices that Blender's
+exporters of PC2, MDD and numbered OBJ files write.
 
 Run as: blender_deformation_test.py PRINT_VERTICES ESIM_PROGRAM. Skips (77) without Blender or NumPy.
 """
@@ -25,9 +26,10 @@ TOLERANCE_M = 1e-5
 KEYS_ONLY = {"skinned_cubic": (0, 25, 60, 100)}
 
 
-def vertices_of(glb, times_s):
-    """Positions and velocities of the only object: times x vertices x 3."""
-    done = subprocess.run([PRINT_VERTICES, glb, *(f"{t_s:.9f}" for t_s in times_s)], capture_output=True, check=True)
+def vertices_of(scene, times_s, vertices=()):
+    """Positions and velocities of the only object: times x vertices x 3. `vertices`: file, frames per second or 0, axes."""
+    cache = ["--vertices", *map(str, vertices)] if vertices else []
+    done = subprocess.run([PRINT_VERTICES, *cache, scene, *(f"{t_s:.9f}" for t_s in times_s)], capture_output=True, check=True)
     values = np.frombuffer(done.stdout, np.float32).reshape(len(times_s), 2, -1, 3).astype(float)
     return values[:, 0], values[:, 1]
 
@@ -78,6 +80,19 @@ class BlenderDeformation(unittest.TestCase):
                 error = np.linalg.norm(ours - theirs[:, matching(ours, theirs)], axis=2).max()
                 print(f"{scene.stem}: {ours.shape[1]} vertices, largest distance {error:.2e} m")
                 self.assertGreater(np.abs(theirs[0] - theirs[50]).max(), 0.05)
+                self.assertLess(error, TOLERANCE_M)
+
+    def test_caches_of_vertices_are_where_blender_puts_them(self):
+        times_s = [frame / FPS for frame in range(FRAMES)]
+        theirs = np.load(self.folder / "cloth.npy")
+        self.assertGreater(np.abs(theirs[0] - theirs[50]).max(), 0.05)
+        for name, rate_hz, axes in (("cloth_y_up.pc2", FPS, "y_up"), ("cloth_z_up.pc2", FPS, "same"),
+                                    ("cloth.mdd", 0, "same"), ("cloth_#.obj", FPS, "same")):
+            with self.subTest(file=name):
+                ours, _ = vertices_of(self.folder / "cloth.obj", times_s, (self.folder / name, rate_hz, axes))
+                error = np.linalg.norm(ours - theirs[:, matching(ours, theirs)], axis=2).max()
+                print(f"{name}: {ours.shape[1]} vertices, largest distance {error:.2e} m")
+                self.assertEqual(ours.shape, theirs.shape)
                 self.assertLess(error, TOLERANCE_M)
 
     def test_velocities_are_the_derivative_of_positions(self):

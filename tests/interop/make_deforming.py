@@ -4,7 +4,8 @@
 
 For each CASE: CASE.glb; CASE.npy, vertices in the world at each of the frames FRAMES (frames x vertices x 3); and
 CASE_imported.npy, the same of the GLB after its import. For each MODIFIED, scenes with modifiers: MODIFIED.blend and
-MODIFIED.npy.
+MODIFIED.npy. For cloth, as Blender's exporters write it: cloth.obj, at the first frame; cloth_y_up.pc2, cloth_z_up.pc2 and
+cloth.mdd; the numbered cloth_*.obj; and cloth.npy.
 """
 
 import math
@@ -12,6 +13,7 @@ import os
 import struct
 import sys
 
+import addon_utils
 import bpy
 import numpy as np
 
@@ -202,3 +204,27 @@ for make in (waving, subdivided, skinned_keys, pc2_cache, mdd_cache):
     np.save(path + ".npy", evaluated())
     bpy.context.scene.frame_set(0)
     bpy.ops.wm.save_as_mainfile(filepath=path + ".blend")
+
+
+def export_cloth():
+    """A mesh with shape keys and a modifier that depends on time, away from the origin."""
+    waving()
+    scene, path = bpy.context.scene, os.path.join(FOLDER, "cloth")
+    thing = scene.objects["Tube"]
+    np.save(path + ".npy", evaluated())
+    scene.frame_set(0)
+    bpy.context.view_layer.objects.active = thing
+    thing.select_set(True)
+    options = {"forward_axis": "Y", "up_axis": "Z", "export_materials": False}
+    bpy.ops.wm.obj_export(filepath=path + ".obj", **options)
+    bpy.ops.wm.obj_export(filepath=path + "_.obj", export_animation=True, start_frame=FRAMES[0], end_frame=FRAMES[-1],
+                          **options)
+    for addon in ("io_export_pc2", "io_shape_mdd"):
+        addon_utils.enable(addon)
+    for name, y_up in (("_y_up", True), ("_z_up", False)):
+        bpy.ops.export_shape.pc2(filepath=f"{path}{name}.pc2", rot_x90=y_up, world_space=True, range_start=FRAMES[0],
+                                 range_end=FRAMES[-1])
+    bpy.ops.export_shape.mdd(filepath=path + ".mdd", fps=24, frame_start=FRAMES[0], frame_end=FRAMES[-1])
+
+
+export_cloth()

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <memory>
 #include <numbers>
+#include <numeric>
 #include <string>
 #include <string_view>
 #include <utility>
@@ -21,6 +22,7 @@
 #include "esim/motion/trajectory.h"
 #include "esim/render/deforming_surfaces.h"
 #include "esim/render/point_spread.h"
+#include "esim/scene/deformation/cached_deformation.h"
 #include "esim/scene/environment/environment.h"
 
 namespace esim::test {
@@ -170,11 +172,29 @@ class Swinging final : public Deformation {
   float amplitude_, frequency_hz_;
 };
 
-/// The same as moving_scene(), with boxes that also deform.
+/// A deformation as a cache of its vertices, 32 frames per second around kTime.
+inline std::shared_ptr<const Deformation> cached(const Deformation& deformation, const Mesh& mesh) {
+  constexpr int kFrames = 33;
+  constexpr double kRate_hz = 32;
+  VertexFrames frames;
+  DeformedVertices at;
+  for (int i = 0; i < kFrames; ++i) {
+    frames.times_s.push_back((i - kFrames / 2) / kRate_hz);
+    deformation.evaluate(to_ns(frames.times_s.back()), at);
+    frames.positions.insert(frames.positions.end(), at.positions.begin(), at.positions.end());
+  }
+  std::vector<std::uint32_t> numbers(mesh.vertices.size());
+  std::iota(numbers.begin(), numbers.end(), 0U);
+  return std::make_shared<const CachedDeformation>(VertexSpline(std::move(frames)), numbers, ShadingNormals(mesh));
+}
+
+/// The same as moving_scene(), with boxes that also deform: the first by a formula, the second by a cache of it.
 inline Scene deforming_scene() {
   Scene scene = moving_scene();
-  for (SceneObject& object : scene.objects)
-    if (object.moves) object.deformation = std::make_shared<const Swinging>(object.mesh.vertices, 0.15F, 1.5F);
+  const auto swinging = [](const Mesh& mesh) { return std::make_shared<const Swinging>(mesh.vertices, 0.15F, 1.5F); };
+  SceneObject &first = scene.objects.at(1), &second = scene.objects.at(2);
+  first.deformation = swinging(first.mesh);
+  second.deformation = cached(*swinging(second.mesh), second.mesh);
   return scene;
 }
 

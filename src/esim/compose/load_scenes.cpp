@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
 #include <map>
+#include <optional>
+#include <tuple>
 #include <utility>
 
 #include "esim/blender/blender.h"
@@ -10,6 +12,7 @@
 #include "esim/geometry/upright.h"
 #include "esim/scene/deformation/adapted.h"
 #include "esim/scene/splats/splat_file.h"
+#include "esim/scene/vertices/vertex_file.h"
 
 namespace esim::inline compose {
 namespace {
@@ -59,29 +62,29 @@ Splats upright_splats(const SplatsRendererOptions& options, const Notices& notic
   return splats;
 }
 
-/// Loads the objects that a scenario lists. Those of the same file and scale share its textures and deformation.
+/// Loads the objects that a scenario lists. Those of the same files and scale share their textures and deformation.
 class ObjectLoader {
  public:
   ObjectLoader(const SplatsRendererOptions* with_splats, SceneLook look, SurfaceModel model, const Notices& notices)
       : with_splats_(with_splats), look_(look), model_(model), notices_(notices) {}
 
   /// An object: a mesh, or splats for a renderer with these.
-  SceneObject load(const ObjectOptions& options) {
-    const auto [known, is_new] = loaded_.try_emplace({options.scene, options.scale});
-    if (is_new) known->second = read(options);
+  SceneObject load(const ObjectOptions& options, const std::string& key) {
+    const auto [known, is_new] = loaded_.try_emplace({options.scene, options.scale, options.vertices});
+    if (is_new) known->second = read(options, key);
     SceneObject object = known->second;
     object.name = options.name;
     return object;
   }
 
  private:
-  SceneObject read(const ObjectOptions& options) const {
+  SceneObject read(const ObjectOptions& options, const std::string& key) const {
     SceneObject object{{}, {}, true};
-    if (with_splats_ != nullptr && is_splat_file(options.scene)) {
+    if (with_splats_ != nullptr && !options.vertices && is_splat_file(options.scene)) {
       object.splats = std::make_shared<const Splats>(splats_of(options.scene, options.scale, *with_splats_, notices_));
       return object;
     }
-    object = load_scene_object(readable(options.scene, notices_), notices_.warning, look_, model_);
+    object = mesh_of(options, key);
     object.moves = true;
     for (Eigen::Vector3f& vertex : object.mesh.vertices) vertex *= static_cast<float>(options.scale);
     if (object.deformation == nullptr) return object;
@@ -92,11 +95,17 @@ class ObjectLoader {
     return object;
   }
 
+  SceneObject mesh_of(const ObjectOptions& options, const std::string& key) const {
+    if (!options.vertices) return load_scene_object(readable(options.scene, notices_), notices_.warning, look_, model_);
+    require_scene_path(options.vertices->file, key + ".vertices.file");
+    return load_object_with_vertices(options.scene, *options.vertices, notices_.warning, look_, model_);
+  }
+
   const SplatsRendererOptions* with_splats_;
   SceneLook look_;
   SurfaceModel model_;
   const Notices& notices_;
-  std::map<std::pair<std::filesystem::path, double>, SceneObject> loaded_;
+  std::map<std::tuple<std::filesystem::path, double, std::optional<VertexFile>>, SceneObject> loaded_;
 };
 
 /// Adds the objects that a scenario lists, and the light.
@@ -104,8 +113,9 @@ void add_objects(const std::vector<ObjectOptions>& objects, const LightingOption
                  const SplatsRendererOptions* with_splats, SceneLook look, const Notices& notices, SceneFile& file) {
   ObjectLoader loader(with_splats, look, surface_model(lighting), notices);
   for (std::size_t i = 0; i < objects.size(); ++i) {
-    require_scene_path(objects[i].scene, fmt::format("objects.{}.scene", i));
-    SceneObject loaded = loader.load(objects[i]);
+    const std::string key = fmt::format("objects.{}", i);
+    require_scene_path(objects[i].scene, key + ".scene");
+    SceneObject loaded = loader.load(objects[i], key);
     if (loaded.name.empty()) loaded.name = fmt::format("object{}", i);
     for (const SceneObject& other : file.scene.objects) {
       if (!other.moves || other.name != loaded.name) continue;

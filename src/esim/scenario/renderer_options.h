@@ -14,6 +14,7 @@
 #include "esim/scenario/trajectory_options.h"
 #include "esim/scene/splats/splats.h"
 #include "esim/scene/sprite.h"
+#include "esim/scene/vertices/vertex_file.h"
 
 /// What the cameras see. A new renderer is a struct with its describe(), an alternative of the variant at the end, and
 /// a function in compose/renderer_factory.cpp.
@@ -33,6 +34,17 @@ void describe(Visitor& visit, AnimationOptions& o) {
   visit("repeat", o.repeat, About{"whether it begins again after its end, instead of resting"});
 }
 
+template <class Visitor>
+void describe(Visitor& visit, VertexFile& o) {
+  visit("file", o.file,
+        About{"point cache, .pc2 or .mdd; or numbered meshes, .obj or .ply, with # for the digits: cloth_####.obj"});
+  visit("rate_hz", o.rate_hz,
+        About{"frames per second; required except for .mdd, which has times", "Hz", 0, 1e6, true});
+  visit("axes", o.axes,
+        About{"axes of the file. same: as in the scene file; y_up: its (x, y, z) is (x, -z, y) there; left_handed: "
+              "its (x, y, z) is (x, z, y) there"});
+}
+
 /// A moving object of the scene.
 struct ObjectOptions {
   std::string name;
@@ -41,6 +53,7 @@ struct ObjectOptions {
   TrajectoryOptions trajectory;
   AnimationOptions animation{};
   std::optional<FlickerOptions> flicker{};  ///< unset: lit by the light of the scene
+  std::optional<VertexFile> vertices{};     ///< unset: those of the scene file
 };
 
 template <class Visitor>
@@ -49,8 +62,11 @@ void describe(Visitor& visit, ObjectOptions& o) {
   visit("scene", o.scene, About{"scene file, in the coordinates of the object"});
   visit("scale", o.scale, About{"factor that converts its coordinates to metres", "", 0, 1e6, true});
   visit("trajectory", o.trajectory, About{"motion: pose of the object's coordinates in the world"});
+  visit("vertices", o.vertices,
+        About{"positions of the vertices over time, from another file; the scene file must be an OBJ or PLY file"});
   visit("animation", o.animation,
-        About{"how the animations of the scene file are played; they begin with the body's trajectory"});
+        About{"how the animations of the scene file, or its vertices, are played; they begin with the body's "
+              "trajectory"});
   visit("flicker", o.flicker, About{"makes the object a light of its own, such as a screen or a lamp, that flickers"});
 }
 
@@ -315,6 +331,8 @@ inline const std::vector<EngineObjectOptions>* engine_objects(const RendererOpti
 
 namespace esim {
 
+template <>
+inline constexpr std::array<const char*, 3> kEnumNames<VertexAxes>{"same", "y_up", "left_handed"};
 template <>
 inline constexpr std::array<const char*, 2> kEnumNames<SpriteUnits>{"pixel", "sensor"};
 template <>

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "esim/scene/import/flatten.h"
+#include "esim/scene/vertices/numbered_mesh.h"
 
 namespace esim::inline scene {
 namespace {
@@ -14,9 +15,7 @@ namespace {
 SceneGraph read_graph(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) fail_scene(path, "no such file");
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
+  const std::string extension = lower_extension(path);
   if (extension == ".gltf" || extension == ".glb") return read_gltf(path);
   for (const char* const known : {".obj", ".ply", ".stl", ".fbx", ".dae"}) {
     if (extension == known) return read_with_assimp(path);

@@ -4,11 +4,13 @@
 #include <fmt/format.h>
 
 #include <assimp/DefaultIOSystem.h>
+#include <assimp/MemoryIOWrapper.h>
 #include <algorithm>
 #include <assimp/Importer.hpp>
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <tuple>
 
@@ -17,20 +19,32 @@
 #include "esim/scene/import/graph_archive.h"
 #include "esim/scene/import/isolated.h"
 #include "esim/scene/import/scene_graph.h"
+#include "esim/scene/vertices/numbered_mesh.h"
 
 namespace esim::inline scene {
 namespace {
 
+/// How the vertices of a mesh get their numbers in the file.
+enum class Numbers {
+  none,
+  places,  ///< they have the order of the file
+  colours  ///< as numbered_obj() writes them
+};
+
 /// Gives assimp read access to the files of the scene's own folder.
 class FolderFiles final : public Assimp::DefaultIOSystem {
  public:
-  explicit FolderFiles(std::filesystem::path folder) : folder_(std::move(folder)) {}
+  /// With a `text`, it replaces the content of the scene's file.
+  FolderFiles(const std::filesystem::path& file, std::optional<std::string> text)
+      : folder_(file.parent_path()), file_(file.string()), text_(std::move(text)) {}
 
   bool Exists(const char* name) const override { return allowed(name) && DefaultIOSystem::Exists(name); }
 
   Assimp::IOStream* Open(const char* name, const char* mode) override {
     if (!allowed(name) || mode[0] != 'r') return nullptr;
     note_used(name);
+    if (text_ && name == file_)
+      return new Assimp::MemoryIOStream(reinterpret_cast<const std::uint8_t*>(text_->data()), text_->size());
     return DefaultIOSystem::Open(name, "rb");
   }
 
@@ -43,6 +57,8 @@ class FolderFiles final : public Assimp::DefaultIOSystem {
   }
 
   std::filesystem::path folder_;
+  std::string file_;
+  std::optional<std::string> text_;
 };
 
 std::string name_of(const aiString& text) {
@@ -65,8 +81,8 @@ Eigen::Vector3d to_eigen(const aiVector3D& v) { return {v.x, v.y, v.z}; }
 /// Converts assimp's result to a graph.
 class Converter {
  public:
-  Converter(const std::filesystem::path& file, std::string format, const aiScene& scene)
-      : file_(file), format_(std::move(format)), scene_(scene) {}
+  Converter(const std::filesystem::path& file, std::string format, Numbers numbers, const aiScene& scene)
+      : file_(file), format_(std::move(format)), numbers_(numbers), scene_(scene) {}
 
   SceneGraph convert() {
     read_materials();
@@ -79,6 +95,10 @@ class Converter {
 
  private:
   void warn(const std::string& text) { graph_.warnings.push_back(text); }
+
+  void warn_of_colours(const std::string& name) {
+    warn(fmt::format("mesh {}: vertex colours are not supported, and are ignored", name));
+  }
 
   /// The image of a material: embedded in the file, or a separate file.
   std::int32_t image(const std::string& name) {
@@ -160,7 +180,21 @@ class Converter {
         fail_scene(file_, fmt::format("has more than {} triangles or {} vertices; simplify it", kMaxSceneTriangles,
                                       kMaxSceneVertices));
       graph_.meshes.push_back(mesh(part));
+      if (numbers_ != Numbers::none) graph_.vertex_numbers.push_back(numbers_of(part));
     }
+  }
+
+  std::vector<std::uint32_t> numbers_of(const aiMesh& part) const {
+    std::vector<std::uint32_t> numbers(part.mNumVertices);
+    for (unsigned i = 0; i < part.mNumVertices; ++i) {
+      numbers[i] = i;
+      if (numbers_ == Numbers::places) continue;
+      const aiColor4D colour = part.HasVertexColors(0) ? part.mColors[0][i] : aiColor4D();
+      const bool sound = colour.r >= 0 && colour.r < kNumberBase && colour.g >= 0 && colour.g < kNumberBase;
+      numbers[i] = sound ? static_cast<std::uint32_t>(colour.r) + static_cast<std::uint32_t>(colour.g) * kNumberBase
+                         : ~std::uint32_t{0};
+    }
+    return numbers;
   }
 
   Mesh mesh(const aiMesh& part) {
@@ -192,7 +226,7 @@ class Converter {
       mesh.texture_uv.push_back(uv);
       mesh.material.push_back(has_material ? part.mMaterialIndex : 0);
     }
-    if (part.HasVertexColors(0)) warn(fmt::format("mesh {}: vertex colours are not supported, and are ignored", name));
+    if (part.HasVertexColors(0) && numbers_ != Numbers::colours) warn_of_colours(name);
     if (part.HasBones())
       warn(fmt::format("mesh {}: skeletons are only read from glTF; it is shown in its rest pose", name));
     if (part.mNumAnimMeshes > 0)
@@ -341,44 +375,50 @@ class Converter {
 
   std::filesystem::path file_;
   std::string format_;
+  Numbers numbers_;
   const aiScene& scene_;
   SceneGraph graph_;
   std::map<std::string, std::int32_t> image_of_;
   std::map<std::string, int> node_of_;
 };
 
-SceneGraph read_here(const std::filesystem::path& file, const std::string& format) {
+SceneGraph read_here(const std::filesystem::path& file, const std::string& format, Numbers numbers) {
   Assimp::Importer importer;
-  importer.SetIOHandler(new FolderFiles(std::filesystem::absolute(file).parent_path()));  // which it deletes
   std::vector<std::string> files;
   const UsedFilesListener listener([&](const UsedFile& used) { files.push_back(used.path.string()); });
+  std::optional<std::string> text;
+  bool coloured = false;
+  if (numbers == Numbers::colours) text = numbered_obj(file, coloured);
+  const std::filesystem::path path = std::filesystem::absolute(file);
+  importer.SetIOHandler(new FolderFiles(path, std::move(text)));  // which it deletes
   importer.SetPropertyBool(AI_CONFIG_IMPORT_FBX_PRESERVE_PIVOTS, false);
-  const aiScene* const scene = importer.ReadFile(
-      std::filesystem::absolute(file).string(),
-      aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_JoinIdenticalVertices | aiProcess_TransformUVCoords);
+  unsigned steps = aiProcess_Triangulate | aiProcess_SortByPType | aiProcess_TransformUVCoords;
+  // It reorders vertices, and joins those in the same place, whatever their numbers are.
+  if (numbers == Numbers::none) steps |= aiProcess_JoinIdenticalVertices;
+  const aiScene* const scene = importer.ReadFile(path.string(), steps);
   if (scene == nullptr || scene->mRootNode == nullptr) {
     std::string reason = importer.GetErrorString();
     std::replace(reason.begin(), reason.end(), '\n', ' ');
     fail_scene(file, "cannot be read: " + reason);
   }
-  SceneGraph graph = Converter(file, format, *scene).convert();
+  SceneGraph graph = Converter(file, format, numbers, *scene).convert();
+  if (coloured)
+    graph.warnings.push_back(
+        fmt::format("scene {}: vertex colours are not supported, and are ignored", file.filename().string()));
   graph.files = std::move(files);
   return graph;
 }
 
-}  // namespace
-
-SceneGraph read_with_assimp(const std::filesystem::path& file) {
+/// Reads a file in a separate process.
+SceneGraph read(const std::filesystem::path& file, Numbers numbers) {
   constexpr std::size_t kMemoryBytes = std::size_t{1} << 30, kMemoryPerByte = 100;
   constexpr unsigned kProcessor_s = 60;
   std::error_code error;
   const auto bytes = static_cast<std::size_t>(std::filesystem::file_size(file, error));
   if (error) fail_scene(file, "cannot be read: " + error.message());
-  std::string format = file.extension().string();
-  std::transform(format.begin(), format.end(), format.begin(), [](unsigned char c) { return std::tolower(c); });
-
+  const std::string format = lower_extension(file);
   const IsolatedResult result =
-      run_isolated([&] { return to_bytes(read_here(file, format)); }, kMemoryBytes + kMemoryPerByte * bytes,
+      run_isolated([&] { return to_bytes(read_here(file, format, numbers)); }, kMemoryBytes + kMemoryPerByte * bytes,
                    kProcessor_s + static_cast<unsigned>(bytes >> 20));
   switch (result.end) {
     case IsolatedResult::End::done: {
@@ -391,6 +431,14 @@ SceneGraph read_with_assimp(const std::filesystem::path& file) {
     default:
       fail_scene(file, "cannot be read: the parser failed or needed too much memory; export the scene again");
   }
+}
+
+}  // namespace
+
+SceneGraph read_with_assimp(const std::filesystem::path& file) { return read(file, Numbers::none); }
+
+SceneGraph read_numbered_with_assimp(const std::filesystem::path& file) {
+  return read(file, lower_extension(file) == ".obj" ? Numbers::colours : Numbers::places);
 }
 
 }  // namespace esim::inline scene

@@ -49,7 +49,7 @@ void archive(Archive& a, GraphCamera& o) {
 template <class Archive>
 void archive(Archive& a, SceneGraph& o) {
   a(o.nodes), a(o.meshes), a(o.materials), a(o.images), a(o.cameras), a(o.ignores_alpha), a(o.relief), a(o.bump_maps),
-      a(o.warnings), a(o.gloss_warnings), a(o.files);
+      a(o.warnings), a(o.gloss_warnings), a(o.files), a(o.vertex_numbers);
 }
 
 /// Whether a type is stored as its bytes.

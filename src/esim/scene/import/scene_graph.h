@@ -105,6 +105,9 @@ struct SceneGraph {
   std::vector<std::string> warnings;
   std::vector<std::string> gloss_warnings;  ///< of what matters only if surfaces shine
   std::vector<std::string> files;           ///< that another process opened to read the scene
+
+  /// Per mesh and vertex: which vertex of the file it is, from 0; only of read_numbered_with_assimp().
+  std::vector<std::vector<std::uint32_t>> vertex_numbers;
 };
 
 /// Limits of a scene, so that a small file cannot request gigabytes.
@@ -126,5 +129,9 @@ SceneGraph read_gltf(const std::filesystem::path& file);
 
 /// The formats that assimp reads: OBJ, PLY, STL, FBX, Collada.
 SceneGraph read_with_assimp(const std::filesystem::path& file);
+
+/// The same for OBJ and PLY, with the numbers of the vertices in the file. These are split: in OBJ, each corner of a
+/// face has a vertex of its own.
+SceneGraph read_numbered_with_assimp(const std::filesystem::path& file);
 
 }  // namespace esim::inline scene

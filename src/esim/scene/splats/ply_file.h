@@ -60,6 +60,9 @@ class PlyRows {
 
   std::uint64_t file_bytes() const { return file_.size(); }
 
+  /// After the last row: where the next element begins.
+  std::uint64_t offset() const { return file_.offset(); }
+
  private:
   struct Column {
     std::size_t offset = 0;  // in bytes from the start of the row, or in words of ASCII

@@ -39,10 +39,20 @@ class SceneFiles {
   void look_at(std::filesystem::path& file) {
     if (!file.empty()) stamps_ += stamp_of(file);
   }
+  void look_at(VertexFile& vertices) {
+    try {
+      for (const std::filesystem::path& file : files_of(vertices)) stamps_ += stamp_of(file);
+    } catch (const UserError&) {  // which loading the scene reports
+    }
+  }
   void look_at(TrajectoryOptions& motion) { motion = StaticTrajectoryOptions{}; }
   template <typename T>
   void look_at(std::vector<T>& values) {
     for (T& value : values) look_at(value);
+  }
+  template <typename T>
+  void look_at(std::optional<T>& value) {
+    if (value) look_at(*value);
   }
   template <typename T>
   void look_at(T& value) {

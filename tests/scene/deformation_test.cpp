@@ -248,6 +248,36 @@ TEST(Deformation, AnAnimationOfTheSameNodesIsLeftOut) {
   EXPECT_EQ(loaded.file.animation.end, kNsPerSecond);
 }
 
+TEST(Deformation, AnObjectPlaysTheAnimationOfAName) {
+  GlbWriter glb = morphing();
+  for (const auto& [name, end_s] : {std::pair{"Idle", 1.0F}, {"Run", 2.0F}, {"Run", 3.0F}}) {
+    const bool again = end_s == 3;  // an animation of the same name that moves something else
+    glb.animate(again ? glb.add_node({{"name", "prop"}, {"mesh", glb.add_triangle()}}) : 0,
+                again ? "translation" : "weights", {0, end_s},
+                again ? std::vector<float>{0, 0, 0, 1, 0, 0} : std::vector<float>{0, 1});
+    glb.json["animations"].back()["name"] = name;
+  }
+  const test::TemporaryDirectory folder;
+  const auto load_playing = [&](const char* file, const std::string& animation) {
+    std::vector<std::string> warnings;
+    const auto warn = [&](const std::string& text) { warnings.push_back(text); };
+    const SceneObject object =
+        load_scene_object(folder.path() / file, warn, SceneLook::luminance, SurfaceModel::matte, animation);
+    EXPECT_EQ(warnings.size(), animation.empty() ? 1U : 0U);
+    return object.deformation->span().end;
+  };
+  folder.write("hero.glb", glb.bytes());
+  EXPECT_EQ(load_playing("hero.glb", "Idle"), to_ns(1));
+  EXPECT_EQ(load_playing("hero.glb", "Run"), to_ns(3));
+  EXPECT_EQ(load_playing("hero.glb", ""), to_ns(3));  // Idle and the second Run, which move different nodes
+  const auto reason = [&](const char* file, const char* animation) {
+    return test::message_of<UserError>([&] { load_playing(file, animation); });
+  };
+  EXPECT_TRUE(test::contains(reason("hero.glb", "Walk"), "has no animation Walk; it has Idle, Run"));
+  folder.write("still.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n");
+  EXPECT_TRUE(test::contains(reason("still.obj", "Run"), "only those of glTF files have names"));
+}
+
 // --- damaged files ---------------------------------------------------------------------------------------------------
 
 /// A triangle with two joints, whose weights are given.

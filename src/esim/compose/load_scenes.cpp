@@ -62,7 +62,8 @@ Splats upright_splats(const SplatsRendererOptions& options, const Notices& notic
   return splats;
 }
 
-/// Loads the objects that a scenario lists. Those of the same files and scale share their textures and deformation.
+/// Loads the objects that a scenario lists. Those of the same files, animation and scale share their textures and
+/// deformation.
 class ObjectLoader {
  public:
   ObjectLoader(const SplatsRendererOptions* with_splats, SceneLook look, SurfaceModel model, const Notices& notices)
@@ -70,7 +71,8 @@ class ObjectLoader {
 
   /// An object: a mesh, or splats for a renderer with these.
   SceneObject load(const ObjectOptions& options, const std::string& key) {
-    const auto [known, is_new] = loaded_.try_emplace({options.scene, options.scale, options.vertices});
+    const auto [known, is_new] =
+        loaded_.try_emplace({options.scene, options.scale, options.animation.name, options.vertices});
     if (is_new) known->second = read(options, key);
     SceneObject object = known->second;
     object.name = options.name;
@@ -96,7 +98,12 @@ class ObjectLoader {
   }
 
   SceneObject mesh_of(const ObjectOptions& options, const std::string& key) const {
-    if (!options.vertices) return load_scene_object(readable(options.scene, notices_), notices_.warning, look_, model_);
+    const std::string& animation = options.animation.name;
+    if (!options.vertices)
+      return load_scene_object(readable(options.scene, notices_), notices_.warning, look_, model_, animation);
+    if (!animation.empty())
+      throw UserError(
+          fmt::format("{}.animation.name: must be left out, since the vertices of a file have no names", key));
     require_scene_path(options.vertices->file, key + ".vertices.file");
     return load_object_with_vertices(options.scene, *options.vertices, notices_.warning, look_, model_);
   }
@@ -105,7 +112,7 @@ class ObjectLoader {
   SceneLook look_;
   SurfaceModel model_;
   const Notices& notices_;
-  std::map<std::tuple<std::filesystem::path, double, std::optional<VertexFile>>, SceneObject> loaded_;
+  std::map<std::tuple<std::filesystem::path, double, std::string, std::optional<VertexFile>>, SceneObject> loaded_;
 };
 
 /// Adds the objects that a scenario lists, and the light.

@@ -22,6 +22,7 @@ namespace esim::inline scenario {
 
 /// How the animation of an object's scene file is played.
 struct AnimationOptions {
+  std::string name{};  ///< empty: all of them
   double time_scale = 1.0;
   double offset_s = 0.0;
   bool repeat = false;
@@ -29,6 +30,10 @@ struct AnimationOptions {
 
 template <class Visitor>
 void describe(Visitor& visit, AnimationOptions& o) {
+  visit(
+      "name", o.name,
+      About{"of the animation that is played, of a glTF or .blend file with several (default: all that move different "
+            "parts)"});
   visit("time_scale", o.time_scale, About{"factor on its duration: 2 takes twice as long", "", 0, 1e6, true});
   visit("offset_s", o.offset_s, About{"time of the animation at which it begins, after its start", "s", 0, 1e6});
   visit("repeat", o.repeat, About{"whether it begins again after its end, instead of resting"});

@@ -12,11 +12,14 @@
 namespace esim::inline scene {
 namespace {
 
-SceneGraph read_graph(const std::filesystem::path& path) {
+/// `animation`: the name of the one that is played; empty: all.
+SceneGraph read_graph(const std::filesystem::path& path, const std::string& animation = {}) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) fail_scene(path, "no such file");
   const std::string extension = lower_extension(path);
-  if (extension == ".gltf" || extension == ".glb") return read_gltf(path);
+  if (extension == ".gltf" || extension == ".glb") return read_gltf(path, animation);
+  if (!animation.empty())
+    fail_scene(path, fmt::format("has no animation {}; only those of glTF files have names", animation));
   for (const char* const known : {".obj", ".ply", ".stl", ".fbx", ".dae"}) {
     if (extension == known) return read_with_assimp(path);
   }
@@ -40,8 +43,8 @@ Mesh load_mesh(const std::filesystem::path& path, const WarningHandler& warn, Sc
 }
 
 SceneObject load_scene_object(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look,
-                              SurfaceModel model) {
-  return flatten_joined(read_graph(path), path, warn, look, model, true);
+                              SurfaceModel model, const std::string& animation) {
+  return flatten_joined(read_graph(path, animation), path, warn, look, model, true);
 }
 
 std::string summary(const SceneFile& file) {

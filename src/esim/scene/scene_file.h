@@ -43,9 +43,10 @@ SceneFile load_scene_file(const std::filesystem::path& path, const WarningHandle
                           SceneLook look = SceneLook::luminance, SurfaceModel model = SurfaceModel::matte);
 
 /// Loads a scene file as one object in the file's coordinates, with the name of the file. If anything in it is
-/// animated, the object deforms: all animations are played. Throws as load_scene_file().
+/// animated, the object deforms: all animations are played, or those with the name `animation`. Throws as
+/// load_scene_file(), and if a file has no animation of that name.
 SceneObject load_scene_object(const std::filesystem::path& path, const WarningHandler& warn, SceneLook look,
-                              SurfaceModel model = SurfaceModel::matte);
+                              SurfaceModel model = SurfaceModel::matte, const std::string& animation = {});
 
 /// A summary in one line: objects, triangles, materials, textures, cameras, animation.
 std::string summary(const SceneFile& file);

@@ -125,7 +125,8 @@ inline constexpr std::size_t kMaxSceneKeys = std::size_t{1} << 22;
 // that are ignored. They check all indices and reject numbers that are not finite.
 
 /// glTF 2.0: .gltf and .glb.
-SceneGraph read_gltf(const std::filesystem::path& file);
+/// `animation`: the name of the one that is played; empty: all.
+SceneGraph read_gltf(const std::filesystem::path& file, const std::string& animation = {});
 
 /// The formats that assimp reads: OBJ, PLY, STL, FBX, Collada.
 SceneGraph read_with_assimp(const std::filesystem::path& file);

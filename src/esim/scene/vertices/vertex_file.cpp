@@ -142,6 +142,14 @@ std::vector<std::filesystem::path> files_of(const VertexFile& vertices) {
   return {vertices.file};
 }
 
+std::vector<std::filesystem::path> files_if_complete(const VertexFile& vertices) {
+  try {
+    return files_of(vertices);
+  } catch (const UserError&) {
+    return {vertices.file};
+  }
+}
+
 VertexFrames read_vertex_frames(const VertexFile& vertices, const std::filesystem::path& mesh) {
   return frames_in_mesh_axes(vertices, mesh, read_numbered_mesh(mesh), [](const std::string&) {});
 }

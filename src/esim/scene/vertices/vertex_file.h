@@ -33,6 +33,9 @@ inline constexpr std::size_t kMaxFrameVertices = std::size_t{1} << 28;
 /// The files that are read: the file itself, or the numbered ones in order. Throws UserError if numbers are missing.
 std::vector<std::filesystem::path> files_of(const VertexFile& vertices);
 
+/// The same, but only the file itself if numbers are missing.
+std::vector<std::filesystem::path> files_if_complete(const VertexFile& vertices);
+
 /// The vertices, in the axes of the mesh in the OBJ or PLY file `mesh`, whose vertices they are. Throws UserError,
 /// naming the file, if it cannot be read or is damaged, or if its vertices or faces are not those of the mesh.
 VertexFrames read_vertex_frames(const VertexFile& vertices, const std::filesystem::path& mesh);

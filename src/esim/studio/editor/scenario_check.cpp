@@ -30,6 +30,9 @@ class FileVisitor {
   void look(const fs::path& path) {
     if (!path.empty()) see_(path);
   }
+  void look(VertexFile& vertices) {
+    for (const fs::path& file : files_if_complete(vertices)) look(file);
+  }
   template <typename T>
   void look(T&) {}
   template <typename T>

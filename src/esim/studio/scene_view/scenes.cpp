@@ -40,10 +40,7 @@ class SceneFiles {
     if (!file.empty()) stamps_ += stamp_of(file);
   }
   void look_at(VertexFile& vertices) {
-    try {
-      for (const std::filesystem::path& file : files_of(vertices)) stamps_ += stamp_of(file);
-    } catch (const UserError&) {  // which loading the scene reports
-    }
+    for (std::filesystem::path& file : files_if_complete(vertices)) look_at(file);
   }
   void look_at(TrajectoryOptions& motion) { motion = StaticTrajectoryOptions{}; }
   template <typename T>

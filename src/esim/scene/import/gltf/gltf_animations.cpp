@@ -7,6 +7,8 @@
 #include <set>
 #include <utility>
 
+#include "esim/files/number_text.h"
+
 namespace esim::inline scene {
 namespace {
 
@@ -17,14 +19,26 @@ class AnimationReader {
   AnimationReader(const GltfDocument& document, const std::vector<int>& node_of, SceneGraph& graph)
       : document_(document), node_of_(node_of), graph_(graph) {}
 
-  void read() {
+  /// Of those with this name; empty: of all.
+  void read(const std::string& name) {
     const Json& animations = document_.list("animations");
+    std::vector<std::string> names;
+    for (std::size_t i = 0; i < animations.size(); ++i)
+      names.push_back(document_.text(animations[i], "name", std::to_string(i)));
+    const std::set<std::string> distinct(names.begin(), names.end());
+    if (!name.empty() && !distinct.contains(name)) {
+      document_.fail(fmt::format("has no animation {}; it has {}", name,
+                                 distinct.empty() ? "none" : list_of_some({distinct.begin(), distinct.end()})));
+    }
     for (std::size_t i = 0; i < animations.size(); ++i) {
+      if (!name.empty() && names[i] != name) continue;
       const std::vector<Channel> channels = channels_of(animations[i]);
       const auto known = [&](const Channel& channel) { return moved_.contains({channel.node, channel.path}); };
       if (std::any_of(channels.begin(), channels.end(), known)) {
-        graph_.warnings.push_back(fmt::format("animation {}: moves what an earlier animation moves, and is not played",
-                                              document_.text(animations[i], "name", std::to_string(i))));
+        graph_.warnings.push_back(fmt::format(
+            "animation {}: moves what an earlier animation moves, and is not played; an entry of objects can "
+            "choose it with animation.name",
+            names[i]));
         continue;
       }
       for (const Channel& channel : channels) {
@@ -131,8 +145,9 @@ class AnimationReader {
 
 }  // namespace
 
-void read_gltf_animations(const GltfDocument& document, const std::vector<int>& node_of, SceneGraph& graph) {
-  AnimationReader(document, node_of, graph).read();
+void read_gltf_animations(const GltfDocument& document, const std::vector<int>& node_of, const std::string& name,
+                          SceneGraph& graph) {
+  AnimationReader(document, node_of, graph).read(name);
 }
 
 }  // namespace esim::inline scene

@@ -33,7 +33,8 @@ class GltfReader {
  public:
   explicit GltfReader(const std::filesystem::path& file) : file_(file), document_(file) {}
 
-  SceneGraph read() {
+  /// `animation`: the name of the one that is played; empty: all.
+  SceneGraph read(const std::string& animation) {
     check_extensions();
     graph_.ignores_alpha = true;
     read_images();
@@ -41,7 +42,7 @@ class GltfReader {
     read_meshes();
     read_nodes();
     read_skins();
-    read_gltf_animations(document_, node_of_, graph_);
+    read_gltf_animations(document_, node_of_, animation, graph_);
     return std::move(graph_);
   }
 
@@ -414,6 +415,8 @@ class GltfReader {
 
 }  // namespace
 
-SceneGraph read_gltf(const std::filesystem::path& file) { return GltfReader(file).read(); }
+SceneGraph read_gltf(const std::filesystem::path& file, const std::string& animation) {
+  return GltfReader(file).read(animation);
+}
 
 }  // namespace esim::inline scene

@@ -106,6 +106,8 @@ cameras:
   EXPECT_EQ(std::get<MeasuredResponse>(scenario.cameras[1].frame_camera->response).path, folder_.path() / "r.txt");
   EXPECT_EQ(write_scenario(read(write_scenario(scenario))), write_scenario(scenario));
   EXPECT_TRUE(contains(error(std::string(kMinimal) + "frame_camera: 5\n"), "camera.frame_camera: must be a map"));
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "sampling: adaptive\n"), "such as {type: adaptive}"));
+  EXPECT_TRUE(contains(error(std::string(kMinimal) + "sampling: 5\n"), "such as {type: flow}"));
   EXPECT_TRUE(contains(error(std::string(kMinimal) + "event_camera: [1]\n"), "camera.event_camera: must be a map"));
 }
 

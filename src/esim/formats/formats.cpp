@@ -1,8 +1,10 @@
 #include "esim/formats/formats.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
+#include <set>
 
 #include "esim/core/error.h"
 #include "esim/files/input_file.h"
@@ -123,8 +125,13 @@ const Format* find_format_for(const fs::path& path) {
 
 const Format& format_for(const fs::path& path) {
   if (const Format* format = find_format_for(path)) return *format;
-  throw UserError(fmt::format("{}: no format has the extension \"{}\"; choose one of {}", path.string(),
-                              extension_of(path), names()));
+  std::set<std::string> known;
+  for (const Format& format : all_formats()) {
+    if (format.create) known.insert(format.extensions.begin(), format.extensions.end());
+  }
+  known.erase("");  // of folders
+  throw UserError(fmt::format("{}: no format has the extension \"{}\"; use one of {}, or name the format",
+                              path.string(), extension_of(path), fmt::join(known, ", ")));
 }
 
 std::unique_ptr<Source> open_source(const fs::path& path, const ReadOptions& options) {

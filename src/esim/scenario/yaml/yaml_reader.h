@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <filesystem>
 #include <set>
 #include <string>
@@ -133,8 +134,13 @@ class YamlReader {
 
   template <typename... T>
   void read(const YAML::Node& node, const std::string& key, std::variant<T...>& value, const About&) {
-    const YamlReader typed(node, key, source_);
     const std::vector<std::string> types = {T::kType...};
+    if (node.IsScalar()) {
+      const bool is_type = std::find(types.begin(), types.end(), node.Scalar()) != types.end();
+      const std::string& example = is_type ? node.Scalar() : types.front();
+      fail(source_, node, key, "must be a map with a type, such as {type: " + example + "}");
+    }
+    const YamlReader typed(node, key, source_);
     const YAML::Node type = node["type"];
     if (!type.IsDefined()) fail(source_, node, key, "needs a type: one of " + list(types));
     const std::size_t index = index_of_name(type, key + ".type", types);

@@ -62,4 +62,7 @@ using Read = std::function<std::size_t(std::span<std::byte>)>;
 /// The first bytes of a file, at most so many; empty if it cannot be read.
 std::string read_head(const std::filesystem::path& path, std::size_t max);
 
+/// The end of a file's name from its last point on, in lower case: ".obj".
+std::string lower_extension(const std::filesystem::path& file);
+
 }  // namespace esim::inline files

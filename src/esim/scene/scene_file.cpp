@@ -6,8 +6,8 @@
 #include <numbers>
 #include <set>
 
+#include "esim/files/input_file.h"
 #include "esim/scene/import/flatten.h"
-#include "esim/scene/vertices/numbered_mesh.h"
 
 namespace esim::inline scene {
 namespace {

@@ -4,6 +4,7 @@
 #include <array>
 #include <string>
 
+#include "esim/files/input_file.h"
 #include "esim/formats/formats.h"
 
 namespace esim::studio {
@@ -41,9 +42,7 @@ FileKind kind_of(const fs::path& place) {
   static constexpr std::array<const char*, 8> kImages{".png", ".jpg", ".jpeg", ".webp", ".pgm", ".ppm", ".exr", ".hdr"};
   std::error_code error;
   if (fs::is_directory(place, error)) return is_recording_folder(place) ? FileKind::recording : FileKind::folder;
-  std::string extension = place.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
+  const std::string extension = lower_extension(place);
   if (extension == ".yaml" || extension == ".yml") return FileKind::scenario;
   if (is_one_of(extension, kScenes)) return FileKind::scene;
   if (is_one_of(extension, kImages)) return FileKind::image;

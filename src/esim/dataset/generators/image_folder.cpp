@@ -12,6 +12,7 @@
 
 #include "esim/core/error.h"
 #include "esim/dataset/files/checksum.h"
+#include "esim/files/input_file.h"
 #include "esim/scene/images/image_file.h"
 #include "esim/scene/images/image_header.h"
 
@@ -29,10 +30,7 @@ constexpr std::array<const char*, 9> kExtensions{".png",  ".jpg", ".jpeg", ".exr
                                                  ".webp", ".ppm", ".pgm",  ".pnm"};
 
 bool is_image(const fs::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  return std::find(kExtensions.begin(), kExtensions.end(), extension) != kExtensions.end();
+  return std::find(kExtensions.begin(), kExtensions.end(), lower_extension(file)) != kExtensions.end();
 }
 
 /// Throws UserError for an unsupported size.

@@ -15,6 +15,7 @@
 #include "esim/core/error.h"
 #include "esim/core/inputs/used_files.h"
 #include "esim/files/codecs/image_codecs.h"
+#include "esim/files/input_file.h"
 #include "esim/files/png_pixels.h"
 #include "esim/scene/images/image_header.h"
 
@@ -134,13 +135,6 @@ CodedImage coded_image(const ImagePixels& image) {
                                      : PixelType::float32};
 }
 
-std::string lower_case_extension(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return extension;
-}
-
 std::vector<std::byte> content_of(const std::filesystem::path& path) {
   std::vector<std::byte> content(size_of(path));
   std::ifstream file = open_input(path);
@@ -152,7 +146,7 @@ std::vector<std::byte> content_of(const std::filesystem::path& path) {
 /// The encoded pixel values of a file on disk that is not OpenEXR.
 ImagePixels read_pixels(const std::filesystem::path& path) {
   const std::vector<std::byte> content = content_of(path);
-  const std::string extension = lower_case_extension(path);
+  const std::string extension = lower_extension(path);
   const bool should_be_jpeg = extension == ".jpg" || extension == ".jpeg" || is_jpeg(as_text(content));
   if (should_be_jpeg && !is_whole_jpeg(as_text(content))) fail(path, "is not a JPEG image, or is cut off");
   return decode_pixels(path, content);
@@ -221,7 +215,7 @@ struct Decoded {
 Decoded load_after_median(const std::filesystem::path& path, const Softening& softening, bool colour) {
   require_file(path);
   Decoded result;
-  if (lower_case_extension(path) == ".exr") {
+  if (lower_extension(path) == ".exr") {
     if (softening.median_px > 1) fail(path, kMedianNeedsBytes);
     load_exr(path, Encoding::automatic, colour, result.planes);
   } else {
@@ -236,7 +230,7 @@ Decoded load_after_median(const std::filesystem::path& path, const Softening& so
 
 void load_planes(const std::filesystem::path& path, Encoding encoding, bool colour, Planes& planes) {
   require_file(path);
-  if (lower_case_extension(path) == ".exr") return load_exr(path, encoding, colour, planes);
+  if (lower_extension(path) == ".exr") return load_exr(path, encoding, colour, planes);
   decode(coded_image(read_pixels(path)), encoding, colour, planes);
 }
 

@@ -15,6 +15,7 @@
 #include <tuple>
 
 #include "esim/core/inputs/used_files.h"
+#include "esim/files/input_file.h"
 #include "esim/scene/import/folder.h"
 #include "esim/scene/import/graph_archive.h"
 #include "esim/scene/import/isolated.h"

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <cstring>
 #include <string>
 
@@ -27,10 +26,7 @@ Kind kind_of(const fs::path& path) {
   if (head.starts_with("\x1F\x8B")) return Kind::gzip;
   if (head.starts_with("PK")) return Kind::zip;
   if (head.starts_with("glTF")) return Kind::glb;
-  std::string extension = path.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
-  if (extension == ".splat") return Kind::dot_splat;
+  if (lower_extension(path) == ".splat") return Kind::dot_splat;
   const std::size_t first = head.find_first_not_of(" \t\r\n");
   return first != std::string::npos && head[first] == '{' ? Kind::json : Kind::none;
 }

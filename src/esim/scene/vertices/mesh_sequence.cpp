@@ -5,6 +5,7 @@
 #include <map>
 #include <string_view>
 
+#include "esim/files/input_file.h"
 #include "esim/files/number_text.h"
 #include "esim/scene/vertices/frame_readers.h"
 

@@ -2,10 +2,8 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <cctype>
-
 #include "esim/core/error.h"
+#include "esim/files/input_file.h"
 #include "esim/scene/import/scene_graph.h"
 #include "esim/scene/vertices/mesh_formats.h"
 
@@ -23,13 +21,6 @@ NumberedMesh read_numbered_mesh(const std::filesystem::path& file) {
   if (mesh.vertices.size() > kMaxSceneVertices)
     fail_vertices(file, fmt::format("has more than {} vertices; simplify the mesh", kMaxSceneVertices));
   return mesh;
-}
-
-std::string lower_extension(const std::filesystem::path& file) {
-  std::string extension = file.extension().string();
-  std::transform(extension.begin(), extension.end(), extension.begin(),
-                 [](unsigned char c) { return std::tolower(c); });
-  return extension;
 }
 
 void check_vertex(const std::filesystem::path& file, std::size_t number, const Eigen::Vector3f& vertex,

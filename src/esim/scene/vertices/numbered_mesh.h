@@ -29,9 +29,6 @@ inline constexpr std::uint32_t kNumberBase = 1 << 16;
 /// red is n % kNumberBase, green n / kNumberBase. `coloured`: whether there were colours before.
 std::string numbered_obj(const std::filesystem::path& file, bool& coloured);
 
-/// The end of a file's name from its last point on, in lower case.
-std::string lower_extension(const std::filesystem::path& file);
-
 /// Throws the UserError "vertices FILE: REASON".
 [[noreturn]] void fail_vertices(const std::filesystem::path& file, const std::string& reason);
 

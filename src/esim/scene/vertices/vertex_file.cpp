@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/files/input_file.h"
 #include "esim/scene/deformation/cached_deformation.h"
 #include "esim/scene/import/flatten.h"
 #include "esim/scene/vertices/frame_readers.h"

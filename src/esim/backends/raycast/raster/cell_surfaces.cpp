@@ -1,24 +1,15 @@
 #include "esim/backends/raycast/raster/cell_surfaces.h"
 
-#include <hwy/highway.h>
-
 #include <bit>
 #include <cmath>
+
+#include "esim/backends/raycast/raster/convex.h"
 
 namespace esim::inline backends::inline raycast {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
-
-using D = hn::CappedTag<float, 8>;
+using D = EightFloats;
 constexpr int kVector = static_cast<int>(hn::MaxLanes(D()));
-
-template <class Mask>
-unsigned bits_of(Mask mask) {
-  std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(D(), mask, bits);
-  return bits[0];
-}
 
 /// A linear function on a rectangle of bearings: its value in the middle, and how much it differs at most.
 struct OnRectangle {

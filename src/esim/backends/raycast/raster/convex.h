@@ -15,6 +15,17 @@ namespace esim::inline backends::inline raycast {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
+/// As many floats as a vector of the processor has, at most 8.
+using EightFloats = hn::CappedTag<float, 8>;
+
+/// A bit for each lane of a mask of these.
+template <class Mask>
+unsigned bits_of(Mask mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(EightFloats(), mask, bits);
+  return bits[0];
+}
+
 /// A position in a pixel, from its centre: [-0.5, 0.5] x [-0.5, 0.5].
 struct PixelPoint {
   float s, t;
@@ -49,7 +60,7 @@ struct Moments {
 
 /// A convex polygon in a pixel, empty if it has fewer than three corners.
 class Convex {
-  using D = hn::CappedTag<float, 8>;
+  using D = EightFloats;
   static constexpr std::size_t kVector = hn::MaxLanes(D());
 
   /// Of f at the corners from i on.

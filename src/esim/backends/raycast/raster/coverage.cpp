@@ -19,15 +19,8 @@ constexpr std::size_t kMaxPieces = 24;  // of a fragment, or of what is left of 
 constexpr std::size_t kMaxCuts = 5;     // of a piece by a surface
 constexpr float kFarCorner = 500;       // px; a corner farther away is not exact enough
 
-using D = hn::CappedTag<float, 8>;
+using D = EightFloats;
 constexpr std::size_t kVector = hn::MaxLanes(D());
-
-template <class Mask>
-unsigned bits_of(Mask mask) {
-  std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(D(), mask, bits);
-  return bits[0];
-}
 
 Fragment fragment_of(std::uint32_t triangle, std::uint16_t pixel, const Moments& sum) {
   const float s = sum.s / sum.area, t = sum.t / sum.area;

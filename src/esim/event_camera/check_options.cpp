@@ -65,13 +65,13 @@ void check(const EventCameraOptions& o) {
                     "circuit.source_follower_hz = {:.6g}; lower it",
                     o.circuit->high_pass_hz, o.circuit->source_follower_hz));
   }
-  const double longest_ms =
-      1e3 / o.circuit->frame_rate_hz.value_or(1e-3) - 2e-6 * static_cast<double>(FrameCoupling::kRise);
-  if (o.circuit->has_frames() && *o.circuit->frame_exposure_ms > longest_ms) {
+  const double period_ms = o.circuit->frame_period_ms(), exposure_ms = o.circuit->exposure_ms();
+  const double longest_ms = period_ms - 2e-6 * static_cast<double>(FrameCoupling::kRise);
+  if (o.circuit->frame_coupling != 0 && exposure_ms > longest_ms) {
     throw UserError(fmt::format(
         "event camera: circuit.frame_exposure_ms = {:.6g}, but at circuit.frame_rate_hz = {:.6g} it must be "
         "at most {:.6g}; lower one of them",
-        *o.circuit->frame_exposure_ms, *o.circuit->frame_rate_hz, longest_ms));
+        exposure_ms, 1e3 / period_ms, longest_ms));
   }
   const std::string older = SensorPreset::find(o.preset.sensor + "@1") ? o.preset.sensor + "@1" : "";
   const std::string remedy = older.empty() ? "remove it" : "remove it, or choose preset " + older;

@@ -79,8 +79,8 @@ struct CircuitOptions {
   double leak_hz_per_klux = 0.0;
   double noise = 1.0;
   double frame_coupling = 0.0;
-  std::optional<double> frame_rate_hz{};      ///< unset: no frames
-  std::optional<double> frame_exposure_ms{};  ///< unset: no frames
+  std::optional<double> frame_rate_hz{};      ///< unset: kUsualFrameRate_hz
+  std::optional<double> frame_exposure_ms{};  ///< unset: kUsualFrameExposure_ms
 
   double threshold_mismatch_common = 0.0;
   double noise_mismatch_decades = 0.0;
@@ -90,7 +90,8 @@ struct CircuitOptions {
   double max_rate_hz = 0.0;
 
   static constexpr double kUsualWhiteLux = 1000;
-  static constexpr double kElementaryCharge_fC = 1.602176634e-4;  ///< fA s
+  static constexpr double kUsualFrameRate_hz = 22.7, kUsualFrameExposure_ms = 6;  // of the Event Camera Dataset
+  static constexpr double kElementaryCharge_fC = 1.602176634e-4;                  ///< fA s
 
   /// The illuminance of a pixel that sees a diffuse white surface at irradiance 1, lux.
   double white_sensor_lux() const {
@@ -101,8 +102,9 @@ struct CircuitOptions {
   /// The time constants of the photodiode at a photocurrent, dark current included, and of the source follower, s.
   double photodiode_s(double current_fa) const { return photodiode_charge_e * kElementaryCharge_fC / current_fa; }
   double source_follower_s() const { return 1 / (2 * std::numbers::pi * source_follower_hz); }
-  /// Whether frames disturb the pixels.
-  bool has_frames() const { return frame_coupling != 0 && frame_rate_hz && frame_exposure_ms; }
+  /// The period and the exposure of the frames that disturb the pixels, ms.
+  double frame_period_ms() const { return 1e3 / frame_rate_hz.value_or(kUsualFrameRate_hz); }
+  double exposure_ms() const { return frame_exposure_ms.value_or(kUsualFrameExposure_ms); }
   /// The dark current in units of the irradiance: L = ln(E + this), plus a constant.
   double dark_irradiance() const { return dark_current_fa / white_photocurrent_fa(); }
 };
@@ -228,9 +230,9 @@ void describe(Visitor& visit, CircuitOptions& o) {
   visit("frame_coupling", o.frame_coupling,
         About{"what the exposure of frames on the same chip subtracts from the comparators' input", "", -1, 1});
   visit("frame_rate_hz", o.frame_rate_hz,
-        About{"rate of these frames (default: that of frame_camera; without one: no frames)", "Hz", 0.01, 1e4});
+        About{"rate of these frames (default: that of frame_camera; without one: 22.7)", "Hz", 0.01, 1e4});
   visit("frame_exposure_ms", o.frame_exposure_ms,
-        About{"their exposure (default: exposure_s of frame_camera)", "ms", 0.2, 1e5});
+        About{"their exposure (default: exposure_s of frame_camera; without one: 6)", "ms", 0.2, 1e5});
   visit("threshold_mismatch_common", o.threshold_mismatch_common,
         About{"relative standard deviation, from pixel to pixel, that both thresholds share", "", 0, 1});
   visit("noise_mismatch_decades", o.noise_mismatch_decades,

@@ -23,12 +23,10 @@ class FrameCoupling {
  public:
   static constexpr TimeNs kFall = 200 * kNsPerUs, kRise = 10 * kNsPerUs;
 
-  explicit FrameCoupling(const CircuitOptions& options) {
-    if (!options.has_frames()) return;
-    coupling_ = options.frame_coupling;
-    period_ = 1e9 / *options.frame_rate_hz;
-    exposure_ = static_cast<TimeNs>(1e6 * *options.frame_exposure_ms);
-  }
+  explicit FrameCoupling(const CircuitOptions& options)
+      : coupling_(options.frame_coupling),
+        period_(1e6 * options.frame_period_ms()),
+        exposure_(static_cast<TimeNs>(1e6 * options.exposure_ms())) {}
 
   bool active() const { return coupling_ != 0; }
 
@@ -42,8 +40,8 @@ class FrameCoupling {
   /// The start of an exposure.
   TimeNs start(double frame) const { return static_cast<TimeNs>(frame * period_) - exposure_ / 2; }
 
-  double coupling_ = 0, period_ = 0;
-  TimeNs exposure_ = 0;
+  double coupling_, period_;
+  TimeNs exposure_;
 };
 
 /// Divides segments at the corners of the coupling, by interpolating the irradiance.

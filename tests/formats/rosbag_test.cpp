@@ -114,7 +114,9 @@ TEST_F(Rosbag, TheIndexLeadsToEveryMessage) {
   output.close();
 
   const std::string bytes = test::content(path);
-  const auto number_at = [&](std::size_t at) { return ros::load<std::uint32_t>(ros::as_bytes(bytes).data() + at); };
+  const auto number_at = [&](std::size_t at) {
+    return load_unaligned<std::uint32_t>(ros::as_bytes(bytes).data() + at);
+  };
   std::size_t chunks = 0, messages = 0, connections = 0, chunk_start = 0, chunk_data = 0;
   std::vector<std::size_t> chunk_positions, indexed_positions;
   for (std::size_t at = rosbag::kMagic.size(); at < bytes.size();) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/core/load_unaligned.h"
 #include "esim/files/codecs/zstandard.h"
 #include "esim/files/input_file.h"
 #include "esim/sample_store/layout.h"
@@ -46,13 +47,6 @@ std::string_view text_of(std::span<const std::byte> bytes) {
   return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
 }
 
-template <typename T>
-T value_of(std::span<const std::byte> bytes) {
-  T value;
-  std::memcpy(&value, bytes.data(), sizeof value);
-  return value;
-}
-
 }  // namespace
 
 struct SampleStoreReader::Impl {
@@ -76,7 +70,7 @@ struct SampleStoreReader::Impl {
     const std::span<const std::byte> bytes = file.read(sizeof(Header));
     if (bytes.size() < sizeof(Header) || std::memcmp(bytes.data(), kMagic.data(), kMagic.size()) != 0)
       wrong("it is not a store of samples (samples.esim of a recording)");
-    const auto header = value_of<Header>(bytes);
+    const auto header = load_unaligned<Header>(bytes.data());
     if (header.version != kVersion) {
       wrong("its version is " + std::to_string(header.version) + ", but this esim reads version " +
             std::to_string(kVersion) + "; simulate again, or use the esim that wrote it");
@@ -190,7 +184,7 @@ void SampleStoreReader::Impl::undo_differences(Rows rows, Block& block) {
 /// Reads the next block; false at the end.
 bool SampleStoreReader::Impl::read(Block& block, const Workers& workers) {
   block_offset = file.offset();
-  const auto header = value_of<BlockHeader>(file.read_exactly(sizeof(BlockHeader), kSamples));
+  const auto header = load_unaligned<BlockHeader>(file.read_exactly(sizeof(BlockHeader), kSamples).data());
   if (header.portions == 0) {
     if (file.offset() + header.list_bytes + sizeof(block_offset) != file.size()) damaged("more follows the end");
     return false;
@@ -257,11 +251,11 @@ bool SampleStoreReader::Impl::read(Block& block, const Workers& workers) {
 void SampleStoreReader::Impl::seek(TimeNs t) {
   constexpr std::size_t kOffsetBytes = sizeof(std::uint64_t);
   file.seek(file.size() - std::min<std::uint64_t>(file.size(), kOffsetBytes));
-  block_offset = value_of<std::uint64_t>(file.read_exactly(kOffsetBytes, kSamples));
+  block_offset = load_unaligned<std::uint64_t>(file.read_exactly(kOffsetBytes, kSamples).data());
   if (block_offset > file.size() - kOffsetBytes)
     file.fail(file.size(), fmt::format("the file ends within {}", kSamples));
   file.seek(block_offset);
-  const auto end = value_of<BlockHeader>(file.read_exactly(sizeof(BlockHeader), kSamples));
+  const auto end = load_unaligned<BlockHeader>(file.read_exactly(sizeof(BlockHeader), kSamples).data());
   if (end.portions != 0 || end.segments > kMaxBlockEntries)
     file.fail(file.size(), fmt::format("the file ends within {}", kSamples));
   std::vector<KeyEntry> keys(end.segments);

@@ -4,9 +4,9 @@
 
 #include <bit>
 #include <cstdint>
-#include <cstring>
 #include <optional>
 
+#include "esim/core/load_unaligned.h"
 #include "esim/files/input_file.h"
 #include "esim/files/output_file.h"
 #include "esim/formats/events_reader.h"
@@ -43,11 +43,7 @@ void append_u32(std::string& bytes, std::uint32_t value) {
   bytes.append(reinterpret_cast<const char*>(&swapped), sizeof(swapped));
 }
 
-std::uint32_t u32_at(const std::byte* bytes) {
-  std::uint32_t value = 0;
-  std::memcpy(&value, bytes, sizeof(value));
-  return __builtin_bswap32(value);
-}
+std::uint32_t u32_at(const std::byte* bytes) { return __builtin_bswap32(load_unaligned<std::uint32_t>(bytes)); }
 
 class Aedat2Writer final : public EventsWriter {
  public:

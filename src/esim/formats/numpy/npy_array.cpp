@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "esim/core/error.h"
+#include "esim/core/load_unaligned.h"
 #include "esim/files/number_text.h"
 
 namespace esim::inline formats::numpy {
@@ -62,9 +63,7 @@ Number load(const std::byte* from, bool big_endian) {
   std::byte bytes[sizeof(Number)];
   std::memcpy(bytes, from, sizeof(Number));
   if (big_endian) std::reverse(std::begin(bytes), std::end(bytes));
-  Number value;
-  std::memcpy(&value, bytes, sizeof(Number));
-  return value;
+  return load_unaligned<Number>(bytes);
 }
 
 /// Calls take(value) with the field of each item.

@@ -4,11 +4,11 @@
 
 #include <bit>
 #include <cmath>
-#include <cstring>
 #include <numbers>
 #include <vector>
 
 #include "esim/core/inputs/used_files.h"
+#include "esim/core/load_unaligned.h"
 #include "esim/files/codecs/zstandard.h"
 #include "esim/files/input_file.h"
 #include "esim/scene/splats/harmonics.h"
@@ -31,9 +31,7 @@ using Bytes = std::span<const std::uint8_t>;
 
 template <typename T>
 T load(Bytes bytes, std::size_t at) {
-  T value;
-  std::memcpy(&value, bytes.subspan(at, sizeof value).data(), sizeof value);
-  return value;
+  return load_unaligned<T>(bytes.subspan(at, sizeof(T)).data());
 }
 
 struct Header {

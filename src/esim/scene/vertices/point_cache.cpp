@@ -8,6 +8,7 @@
 #include <span>
 
 #include "esim/core/inputs/used_files.h"
+#include "esim/core/load_unaligned.h"
 #include "esim/files/input_file.h"
 #include "esim/scene/vertices/frame_readers.h"
 #include "esim/scene/vertices/mesh_formats.h"
@@ -21,9 +22,7 @@ constexpr double kMaxTime_s = 1e6, kMinStep_s = 1e-6;
 
 template <typename T>
 T load(std::span<const std::byte> bytes, std::size_t at) {
-  T value;
-  std::memcpy(&value, bytes.data() + at, sizeof value);
-  return value;
+  return load_unaligned<T>(bytes.data() + at);
 }
 
 template <typename T>

@@ -10,6 +10,8 @@
 #include <string_view>
 #include <type_traits>
 
+#include "esim/core/load_unaligned.h"
+
 namespace esim::inline formats::ros {
 
 static_assert(std::endian::native == std::endian::little, "numbers in these files are little-endian");
@@ -20,14 +22,6 @@ class Malformed : public std::runtime_error {
  public:
   using std::runtime_error::runtime_error;
 };
-
-template <typename T>
-T load(const std::byte* from) {
-  static_assert(std::is_trivially_copyable_v<T>);
-  T value;
-  std::memcpy(&value, from, sizeof value);
-  return value;
-}
 
 template <typename T>
 void store(char* to, T value) {
@@ -67,7 +61,7 @@ class ByteReader {
 
   template <typename T>
   T number() {
-    return load<T>(take(sizeof(T)).data());
+    return load_unaligned<T>(take(sizeof(T)).data());
   }
 
   /// A text, or other bytes, preceded by their number as 32 bits.

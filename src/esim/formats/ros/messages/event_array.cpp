@@ -40,10 +40,10 @@ void read(MessageReader& reader, std::size_t count, std::vector<Event>& events) 
   const std::byte* const from = reader.take(At::bytes(count)).data();
   events.resize(count);
   for (std::size_t i = 0; i < count; ++i) {
-    events[i] = {
-        TimeNs{load<Seconds>(from + At::seconds(i))} * kNsPerSecond + load<std::uint32_t>(from + At::nanoseconds(i)),
-        load<std::uint16_t>(from + At::x(i)), load<std::uint16_t>(from + At::y(i)),
-        static_cast<std::int8_t>(from[At::polarity(i)] != std::byte{0} ? 1 : -1)};
+    events[i] = {TimeNs{load_unaligned<Seconds>(from + At::seconds(i))} * kNsPerSecond +
+                     load_unaligned<std::uint32_t>(from + At::nanoseconds(i)),
+                 load_unaligned<std::uint16_t>(from + At::x(i)), load_unaligned<std::uint16_t>(from + At::y(i)),
+                 static_cast<std::int8_t>(from[At::polarity(i)] != std::byte{0} ? 1 : -1)};
   }
 }
 

@@ -16,7 +16,7 @@ Event event_at(TimeNs t, std::uint64_t x, std::uint64_t y, bool on) {
 template <typename Word, typename Take>
 void for_each_word(Bytes bytes, const Take& take) {
   if (bytes.size() % sizeof(Word) != 0) throw Malformed("its events end within a word");
-  for (std::size_t i = 0; i < bytes.size(); i += sizeof(Word)) take(load<Word>(bytes.data() + i));
+  for (std::size_t i = 0; i < bytes.size(); i += sizeof(Word)) take(load_unaligned<Word>(bytes.data() + i));
 }
 
 /// The fields of a word of mono and trigger: bits 0 to 31 are ns after the time base.

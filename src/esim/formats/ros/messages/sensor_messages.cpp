@@ -159,7 +159,7 @@ int to_frame(const ImageMessage& message, Image<std::uint16_t>& frame) {
     return 8;
   }
   if (encoding == "mono16" || encoding == "16UC1" || is_bayer(encoding, "16")) {
-    read_pixels(message, 2, frame, [](const std::byte* at) { return load<std::uint16_t>(at); });
+    read_pixels(message, 2, frame, [](const std::byte* at) { return load_unaligned<std::uint16_t>(at); });
     return 16;
   }
   const Colours colours = colours_of(encoding);
@@ -173,12 +173,13 @@ int to_frame(const ImageMessage& message, Image<std::uint16_t>& frame) {
 
 bool to_floats(const ImageMessage& message, Image<float>& image) {
   if (message.encoding == "32FC1") {
-    read_pixels(message, sizeof(float), image, [](const std::byte* at) { return load<float>(at); });
+    read_pixels(message, sizeof(float), image, [](const std::byte* at) { return load_unaligned<float>(at); });
     return true;
   }
   if (message.encoding != "16UC1") return false;
-  read_pixels(message, 2, image,
-              [](const std::byte* at) { return kMetresPerMillimetre * static_cast<float>(load<std::uint16_t>(at)); });
+  read_pixels(message, 2, image, [](const std::byte* at) {
+    return kMetresPerMillimetre * static_cast<float>(load_unaligned<std::uint16_t>(at));
+  });
   return true;
 }
 

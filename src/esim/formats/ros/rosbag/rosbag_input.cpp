@@ -70,7 +70,8 @@ bool RosbagInput::next_in_file(Record& record) {
   record.offset = file_.offset();
   if (record.offset == file_.size()) return false;
   const auto length = [&](std::uint64_t max, std::string_view what) {
-    const auto bytes = ros::load<std::uint32_t>(file_.read_exactly(4, "the length of " + std::string(what)).data());
+    const auto bytes =
+        load_unaligned<std::uint32_t>(file_.read_exactly(4, "the length of " + std::string(what)).data());
     if (bytes > max) fail(record.offset, std::string(what) + " is too long: " + std::to_string(bytes) + " bytes");
     return bytes;
   };

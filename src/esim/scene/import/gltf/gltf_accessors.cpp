@@ -3,9 +3,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <utility>
 
+#include "esim/core/load_unaligned.h"
 #include "esim/scene/import/gltf/gltf_document.h"
 #include "esim/scene/import/scene_graph.h"
 
@@ -41,51 +41,44 @@ std::size_t component_count(const std::string& type) {
   return 0;
 }
 
-template <typename T>
-T load(const std::byte* from) {
-  T value;
-  std::memcpy(&value, from, sizeof value);
-  return value;
-}
-
 float as_float(const std::byte* from, int type) {
   switch (type) {
     case kByte:
-      return std::max(static_cast<float>(load<std::int8_t>(from)) / 127.0F, -1.0F);
+      return std::max(static_cast<float>(load_unaligned<std::int8_t>(from)) / 127.0F, -1.0F);
     case kUnsignedByte:
-      return static_cast<float>(load<std::uint8_t>(from)) / 255.0F;
+      return static_cast<float>(load_unaligned<std::uint8_t>(from)) / 255.0F;
     case kShort:
-      return std::max(static_cast<float>(load<std::int16_t>(from)) / 32767.0F, -1.0F);
+      return std::max(static_cast<float>(load_unaligned<std::int16_t>(from)) / 32767.0F, -1.0F);
     case kUnsignedShort:
-      return static_cast<float>(load<std::uint16_t>(from)) / 65535.0F;
+      return static_cast<float>(load_unaligned<std::uint16_t>(from)) / 65535.0F;
     default:
-      return load<float>(from);
+      return load_unaligned<float>(from);
   }
 }
 
 float as_integer(const std::byte* from, int type) {
   switch (type) {
     case kByte:
-      return static_cast<float>(load<std::int8_t>(from));
+      return static_cast<float>(load_unaligned<std::int8_t>(from));
     case kUnsignedByte:
-      return static_cast<float>(load<std::uint8_t>(from));
+      return static_cast<float>(load_unaligned<std::uint8_t>(from));
     case kShort:
-      return static_cast<float>(load<std::int16_t>(from));
+      return static_cast<float>(load_unaligned<std::int16_t>(from));
     case kUnsignedShort:
-      return static_cast<float>(load<std::uint16_t>(from));
+      return static_cast<float>(load_unaligned<std::uint16_t>(from));
     default:
-      return static_cast<float>(load<std::uint32_t>(from));
+      return static_cast<float>(load_unaligned<std::uint32_t>(from));
   }
 }
 
 std::uint32_t as_index(const std::byte* from, int type) {
   switch (type) {
     case kUnsignedByte:
-      return load<std::uint8_t>(from);
+      return load_unaligned<std::uint8_t>(from);
     case kUnsignedShort:
-      return load<std::uint16_t>(from);
+      return load_unaligned<std::uint16_t>(from);
     default:
-      return load<std::uint32_t>(from);
+      return load_unaligned<std::uint32_t>(from);
   }
 }
 

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstring>
 #include <limits>
 #include <utility>
 
+#include "esim/core/load_unaligned.h"
 #include "esim/scene/import/folder.h"
 #include "esim/scene/import/scene_graph.h"
 
@@ -18,13 +18,6 @@ namespace {
 using Json = GltfDocument::Json;
 
 constexpr std::uint32_t kGlbMagic = 0x46546C67, kJsonChunk = 0x4E4F534A, kBinaryChunk = 0x004E4942;
-
-template <typename T>
-T load(const std::byte* from) {
-  T value;
-  std::memcpy(&value, from, sizeof value);
-  return value;
-}
 
 /// Whether a number is finite, also in single precision.
 bool is_finite_number(const Json& value) {
@@ -58,15 +51,15 @@ std::vector<std::byte> base64_decoded(std::string_view text) {
 GltfDocument::GltfDocument(const std::filesystem::path& file) : file_(file) {
   std::vector<std::byte> content = read_bytes(file);
   std::vector<std::byte> binary;
-  if (content.size() >= 4 && load<std::uint32_t>(content.data()) == kGlbMagic) {
+  if (content.size() >= 4 && load_unaligned<std::uint32_t>(content.data()) == kGlbMagic) {
     constexpr std::size_t kHeader = 12, kChunkHeader = 8;
-    if (content.size() < kHeader + kChunkHeader || load<std::uint32_t>(&content[4]) != 2)
+    if (content.size() < kHeader + kChunkHeader || load_unaligned<std::uint32_t>(&content[4]) != 2)
       fail("is not a GLB file of version 2, or is cut off");
-    if (load<std::uint32_t>(&content[8]) > content.size()) fail("is cut off: copy or export it again");
+    if (load_unaligned<std::uint32_t>(&content[8]) > content.size()) fail("is cut off: copy or export it again");
     std::size_t at = kHeader;
     for (int chunk = 0; at + kChunkHeader <= content.size(); ++chunk) {
-      const std::size_t bytes = load<std::uint32_t>(&content[at]);
-      const auto type = load<std::uint32_t>(&content[at + 4]);
+      const std::size_t bytes = load_unaligned<std::uint32_t>(&content[at]);
+      const auto type = load_unaligned<std::uint32_t>(&content[at + 4]);
       at += kChunkHeader;
       if (bytes > content.size() - at) fail("is cut off: copy or export it again");
       const std::span<const std::byte> data(content.data() + at, bytes);

@@ -8,6 +8,7 @@
 #include <limits>
 #include <numbers>
 
+#include "esim/characterise/normal_distribution.h"
 #include "esim/core/error.h"
 #include "esim/stats/numerics/minimise.h"
 
@@ -43,8 +44,6 @@ double amplitude_of(double frequency_hz, double t1_s, double t2_s, double thresh
   const double discriminant = slope * slope + 4 * sign * shift * threshold;
   return 2 * threshold / (slope + std::sqrt(std::max(0.0, discriminant)));
 }
-
-double normal_cdf(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
 
 }  // namespace
 

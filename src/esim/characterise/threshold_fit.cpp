@@ -8,6 +8,7 @@
 #include <numbers>
 #include <vector>
 
+#include "esim/characterise/normal_distribution.h"
 #include "esim/core/error.h"
 #include "esim/stats/numerics/minimise.h"
 
@@ -24,9 +25,6 @@ constexpr std::array<double, 9> kNormalWeights{2.234584400774658e-5, 2.789141321
 
 constexpr int kThresholds = 41;  // of the distribution of pixels, within kReach standard deviations
 constexpr double kReach = 4;
-
-double normal_pdf(double z) { return std::exp(-0.5 * z * z) / std::sqrt(2 * std::numbers::pi); }
-double normal_cdf(double z) { return 0.5 * std::erfc(-z / std::numbers::sqrt2); }
 
 /// The noise of a pixel in the light after a step, and the step response.
 struct Noise {

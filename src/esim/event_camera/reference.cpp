@@ -18,7 +18,6 @@
 namespace esim::inline event_camera {
 namespace {
 
-constexpr double kNever = ReferenceSignal::kNever;
 constexpr TimeNs kNoTime = std::numeric_limits<TimeNs>::max();
 constexpr double kToUnit = 0x1.0p-32;  // from a random word to [0, 1)
 
@@ -226,7 +225,7 @@ void ReferenceEventCamera::Model::open(std::size_t i, double light, double brigh
     pixel.set_at = -leaked / pixel.leak;
   }
   // (9) The first candidate of shot noise. (10) A dead pixel has none.
-  if (options_.shot_noise_hz > 0 && pixel.on < kNever) {
+  if (options_.shot_noise_hz > 0 && pixel.on < ReferenceSignal::kNever) {
     pixel.shot_at = t;
     next_shot(pixel, shot_.uniforms(item, 0)[0]);
   }
@@ -255,7 +254,7 @@ void ReferenceEventCamera::Model::draw_parameters(std::size_t i) {
   const double kappa = std::pow(10.0, options_.leak_mismatch_decades * leak_.normals(item)[0]);
   const auto mean_leak = static_cast<float>(f * kappa * (c_on + mean_on));
   pixel.leak = static_cast<float>(mean_leak / std::max(1 + options_.leak_jitter * pixel.normals[2], 0.05));
-  if (dead < options_.dead_pixels) pixel.on = pixel.off = kNever, pixel.leak = 0;
+  if (dead < options_.dead_pixels) pixel.on = pixel.off = ReferenceSignal::kNever, pixel.leak = 0;
 }
 
 /// (9) Candidates of shot noise are a Poisson process at the rate in the dark.
@@ -316,7 +315,7 @@ std::optional<Labelled> ReferenceEventCamera::Model::next_event(std::size_t i, c
     double tau = signal.first_crossing(pixel.from, pixel.leak, lower, upper, polarity);
     // (9) Shot noise may come first.
     const bool shot = find_shot(i, signal, tau, polarity);
-    if (tau == kNever) return std::nullopt;
+    if (tau == ReferenceSignal::kNever) return std::nullopt;
     const TimeNs t = std::clamp<TimeNs>(signal.t0 + std::llround(tau * 1e9), signal.t0 + 1, signal.t1);
     NewLabel label = this->label(pixel, signal, tau, polarity, shot);
     label.t_ideal = t;

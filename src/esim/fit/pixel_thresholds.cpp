@@ -11,11 +11,11 @@
 namespace esim::inline fit {
 namespace {
 
-constexpr double kTypicalSpread = 0.05;      // of thresholds from pixel to pixel, for weights
-constexpr double kPoor = 0.25;               // relative error of a threshold beyond which a pixel does not count
-constexpr std::uint32_t kFewestOfPixel = 6;  // equations
-constexpr std::uint64_t kFewest = 1000;      // equations of all pixels
-constexpr int kBlock = 8;                    // px
+constexpr double kTypicalSpread = 0.05;           // of thresholds from pixel to pixel, for weights
+constexpr double kPoor = 0.25;                    // relative error of a threshold beyond which a pixel does not count
+constexpr std::uint32_t kFewestOfPixel = 6;       // equations
+constexpr std::uint64_t kFewestEquations = 1000;  // equations of all pixels
+constexpr int kBlock = 8;                         // px
 constexpr double kMostOfBlock = 0.9;
 constexpr double kExplained = 0.5;  // fraction of the variance of L below which nothing is determined
 
@@ -66,9 +66,9 @@ void PixelThresholds::add(int x, int y, const std::array<EquationProducts, 2>& h
 }
 
 std::optional<std::string> PixelThresholds::solve() {
-  if (equations_ < kFewest) {
+  if (equations_ < kFewestEquations) {
     return fmt::format("only {} events lie near images of a scene that moves; at least {} are necessary", equations_,
-                       kFewest);
+                       kFewestEquations);
   }
   shared_ = find_shared(std::nullopt);
   find_residual();

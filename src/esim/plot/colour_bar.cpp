@@ -5,7 +5,7 @@
 namespace esim::inline plot {
 namespace {
 
-constexpr int kTick = 5, kGap = 5;
+constexpr int kTickLength = 5, kGap = 5;
 
 std::string unit_of(const Scale& scale, const Ticks& ticks) {
   return scale.title + (ticks.factor.empty() ? "" : " " + ticks.factor);
@@ -16,8 +16,9 @@ void draw_horizontal(Canvas& canvas, const Tile& bar, const Scale& scale, const 
   ticks.major.back().label += " " + unit_of(scale, ticks);
   for (const Tick& tick : ticks.major) {
     const int x = bar.x + static_cast<int>(std::lround(scale.position(tick.value) * (bar.width - 1)));
-    canvas.fill({x, bar.y + bar.height, 1, kTick}, theme.faint_ink);
-    canvas.text(x, bar.y + bar.height + kTick + kGap + kTextHeight, tick.label, kTextHeight, theme.ink, Align::centre);
+    canvas.fill({x, bar.y + bar.height, 1, kTickLength}, theme.faint_ink);
+    canvas.text(x, bar.y + bar.height + kTickLength + kGap + kTextHeight, tick.label, kTextHeight, theme.ink,
+                Align::centre);
   }
 }
 
@@ -25,8 +26,8 @@ void draw_vertical(Canvas& canvas, const Tile& bar, const Scale& scale, const Th
   const Ticks ticks = ticks_that_fit(scale, bar.height, Direction::vertical);
   for (const Tick& tick : ticks.major) {
     const int y = bar.y + static_cast<int>(std::lround((1 - scale.position(tick.value)) * (bar.height - 1)));
-    canvas.fill({bar.x + bar.width, y, kTick, 1}, theme.faint_ink);
-    canvas.text(bar.x + bar.width + kTick + kGap, y + kTextHeight / 2, tick.label, kTextHeight, theme.ink);
+    canvas.fill({bar.x + bar.width, y, kTickLength, 1}, theme.faint_ink);
+    canvas.text(bar.x + bar.width + kTickLength + kGap, y + kTextHeight / 2, tick.label, kTextHeight, theme.ink);
   }
   canvas.text(bar.x, bar.y - 2 * kGap, unit_of(scale, ticks), kTextHeight, theme.ink);
 }

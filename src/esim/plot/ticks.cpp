@@ -14,7 +14,7 @@
 namespace esim::inline plot {
 namespace {
 
-constexpr int kMinTicks = 3, kMaxTicks = 10;
+constexpr int kFewestTicks = 3, kMostTicks = 10;
 constexpr std::array<int, 3> kMantissas = {1, 2, 5};
 constexpr double kRounding = 1e-9;  // of a step
 
@@ -40,13 +40,13 @@ struct Multiples {
 };
 
 Step choose_step(double low, double high, int wanted) {
-  wanted = std::clamp(wanted, kMinTicks, kMaxTicks);
-  Step step{1, static_cast<int>(std::floor(std::log10((high - low) / kMaxTicks))) - 1};
+  wanted = std::clamp(wanted, kFewestTicks, kMostTicks);
+  Step step{1, static_cast<int>(std::floor(std::log10((high - low) / kMostTicks))) - 1};
   std::optional<Step> chosen;
   for (;; step = step.next()) {
     const double count = Multiples(low, high, step).count();
-    if (count < kMinTicks) return *chosen;  // a step of 3 to 10 ticks comes before, since steps grow by at most 2.5
-    if (count > kMaxTicks) continue;
+    if (count < kFewestTicks) return *chosen;  // a step of 3 to 10 ticks comes before, since steps grow by at most 2.5
+    if (count > kMostTicks) continue;
     chosen = step;
     if (count <= wanted) return step;
   }
@@ -105,13 +105,13 @@ struct ChosenMarks {
 
 /// The marks with the largest number up to `wanted`; empty if there are fewer than three.
 ChosenMarks choose_marks(double low, double high, int wanted) {
-  wanted = std::clamp(wanted, kMinTicks, kMaxTicks);
+  wanted = std::clamp(wanted, kFewestTicks, kMostTicks);
   constexpr std::array<int, 1> kOne = {1};
   constexpr std::array<int, 9> kAll = {1, 2, 3, 4, 5, 6, 7, 8, 9};
   ChosenMarks chosen;
   const auto is_enough = [&](std::vector<LogTick> major, std::vector<LogTick> minor) {
-    if (major.size() < kMinTicks) return true;  // so are all coarser ones
-    if (major.size() <= kMaxTicks) chosen = {std::move(major), std::move(minor)};
+    if (major.size() < kFewestTicks) return true;  // so are all coarser ones
+    if (major.size() <= kMostTicks) chosen = {std::move(major), std::move(minor)};
     return !chosen.major.empty() && chosen.major.size() <= static_cast<std::size_t>(wanted);
   };
   if (is_enough(marks(low, high, 1, kMantissas), marks(low, high, 1, kAll))) return chosen;

@@ -14,7 +14,7 @@ namespace {
 constexpr int kMinSide = 16;          // px; smaller images have no search pyramid
 constexpr float kNoise = 0.1F;        // px; slower motion counts as 0
 constexpr std::size_t kLooks = 4096;  // pixels that determine the scale
-constexpr int kRowsPerPiece = 16;
+constexpr int kRowsAtOnce = 16;
 
 /// Nearly the maximum irradiance of an image: a quantile, so that single hot pixels do not darken the others.
 float white_level(const Image<float>& light) {
@@ -112,9 +112,9 @@ void OpticalFlow::estimate(const Image<float>& before, const Image<float>& after
     cv::setNumThreads(1);  // the result of the search depends on the number of threads
     workers.for_each(2, [&](int i) { impl.searches[i]->calc(impl.images[i], impl.images[1 - i], impl.fields[i]); });
   }
-  workers.for_each((height + kRowsPerPiece - 1) / kRowsPerPiece, [&](int piece) {
-    const int first = piece * kRowsPerPiece;
-    for (int y = first; y < std::min(first + kRowsPerPiece, height); ++y) impl.clean_row(y, forward, backward);
+  workers.for_each((height + kRowsAtOnce - 1) / kRowsAtOnce, [&](int piece) {
+    const int first = piece * kRowsAtOnce;
+    for (int y = first; y < std::min(first + kRowsAtOnce, height); ++y) impl.clean_row(y, forward, backward);
   });
 }
 

@@ -7,7 +7,7 @@ namespace esim::inline event_camera {
 namespace {
 
 /// 1 - exp(-u) for u >= 0, to a dozen digits: several times as fast as std::expm1.
-double moved_after(double u) {
+double scalar_moved_after(double u) {
   constexpr double kSmall = 0.01;
   if (u > kSmall) return 1 - std::exp(-u);
   return u * (1 - u / 2 * (1 - u / 3 * (1 - u / 4 * (1 - u / 5 * (1 - u / 6)))));
@@ -27,7 +27,7 @@ RelaxingSignal::Point RelaxingSignal::at(double u, double moved) const {
   return {u, second + offset_ + drift_ * u, first - second + drift_, input - 2 * first + second};
 }
 
-RelaxingSignal::Point RelaxingSignal::at(double u) const { return at(u, moved_after(u)); }
+RelaxingSignal::Point RelaxingSignal::at(double u) const { return at(u, scalar_moved_after(u)); }
 
 double RelaxingSignal::value(double tau) const { return at(rate_ * tau).value; }
 

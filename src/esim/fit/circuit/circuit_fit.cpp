@@ -20,7 +20,7 @@ namespace {
 
 using Eigen::MatrixXd, Eigen::VectorXd;
 using enum CircuitModel::Index;
-using Index = CircuitModel::Index;
+using ModelIndex = CircuitModel::Index;
 
 constexpr double kWidest = 0.7;       // half a 95 % interval, in units of the logarithm: a factor of 2
 constexpr double kUnknown = 3;        // standard deviation of the logarithm of a parameter before the fit
@@ -114,12 +114,12 @@ class Fitter {
                               : lamp_problem.empty()
                                   ? "recordings of a lamp at two frequencies, at least, are necessary"
                                   : lamp_problem;
-      for (const Index k : {kOn, kOff, kPhotocurrent, kFollower}) reasons_[k] = why;
+      for (const ModelIndex k : {kOn, kOff, kPhotocurrent, kFollower}) reasons_[k] = why;
     } else if (levels.size() < 2) {
-      for (const Index k : {kPhotocurrent, kFollower})
+      for (const ModelIndex k : {kPhotocurrent, kFollower})
         reasons_[k] = "lamps at one light level do not tell which of the two time constants is the photodiode's";
     }
-    const auto need = [&](Index k, std::size_t count) {
+    const auto need = [&](ModelIndex k, std::size_t count) {
       if (noise_levels.size() >= count) {
         reasons_[k].clear();
         return true;
@@ -151,7 +151,7 @@ class Fitter {
     const auto size = static_cast<Eigen::Index>(free_.size());
     CircuitTarget t{count_moments(used_, usable_), areas_, VectorXd(size), VectorXd(), VectorXd::Zero(size)};
     for (Eigen::Index k = 0; k < size; ++k) {
-      const Index index = free_[static_cast<std::size_t>(k)];
+      const ModelIndex index = free_[static_cast<std::size_t>(k)];
       t.start[k] = std::log(CircuitModel::value(base_, index));
       if (index > kOff || !known_thresholds_) continue;
       const Estimate& known = index == kOn ? *input_.on : *input_.off;
@@ -198,7 +198,7 @@ class Fitter {
 
   void report() {
     for (std::size_t i = 0; i < CircuitModel::kParameters; ++i) {
-      const auto index = static_cast<Index>(i);
+      const auto index = static_cast<ModelIndex>(i);
       if (index <= kOff && known_thresholds_) continue;
       if (reasons_[i].empty() && (solutions_.empty() || std::find(free_.begin(), free_.end(), index) == free_.end()))
         reasons_[i] = "no recording tells it";
@@ -247,7 +247,7 @@ class Fitter {
                            source);
   }
 
-  const char* source_of(Index k) const {
+  const char* source_of(ModelIndex k) const {
     if (k == kCharge || k == kDark || !has_lamps_) return "noise in known light, by simulation";
     return "events of a lamp, by simulation";
   }
@@ -280,7 +280,7 @@ class Fitter {
   EventCameraOptions base_;
   std::vector<PixelCounts> used_;
   std::array<std::string, CircuitModel::kParameters> reasons_;  // why a parameter is not determined
-  std::vector<Index> free_;
+  std::vector<ModelIndex> free_;
   bool known_thresholds_ = false, has_lamps_ = false;
   std::vector<bool> usable_;
   std::vector<VectorXd> areas_;

@@ -27,8 +27,8 @@ constexpr double kSmallStep = 0.07;  // of a logarithm, with which the approach 
 constexpr double kLongestStep = 0.4;
 // The slopes under lamps are means over the values that are probable, but over at least a fraction, and at most all of
 // these changes of the logarithms. In constant light, the slopes vary little: means over all of them.
-constexpr std::array<double, CircuitModel::kParameters> kWidest{0.08, 0.08, 0.2, 0.2, 0.25, 0.25},
-    kWidestNoise{0.1, 0.1, 0.3, 0.3, 0.3, 0.4};
+constexpr std::array<double, CircuitModel::kParameters> kRangeOfLamps{0.08, 0.08, 0.2, 0.2, 0.25, 0.25},
+    kRangeOfNoise{0.1, 0.1, 0.3, 0.3, 0.3, 0.4};
 constexpr double kNarrowest = 0.5;
 // Standard deviations of the points by which slopes are found: within which they hold, and the longest step.
 constexpr double kNear = 2, kFar = 4;
@@ -315,7 +315,8 @@ MatrixXd CircuitSolver::limited(const MatrixXd& precision) const {
   const Index n = precision.rows();
   VectorXd widest(n);
   for (Index k = 0; k < n; ++k)
-    widest[k] = (model_.has_lamps() ? kWidest : kWidestNoise)[model_.parameter(k)] / std::sqrt(static_cast<double>(n));
+    widest[k] =
+        (model_.has_lamps() ? kRangeOfLamps : kRangeOfNoise)[model_.parameter(k)] / std::sqrt(static_cast<double>(n));
   const auto only_noise = [&](Index k) { return !model_.has_lamps() || model_.parameter(k) >= CircuitModel::kCharge; };
   MatrixXd bounded = precision;
   bounded.diagonal() += widest.cwiseAbs2().cwiseInverse();

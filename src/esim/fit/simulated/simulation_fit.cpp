@@ -16,13 +16,13 @@
 namespace esim::inline fit {
 namespace {
 
-constexpr std::uint64_t kFewest = 100;  // events of each polarity
+constexpr std::uint64_t kFewestOfPolarity = 100;  // events
 constexpr std::uint64_t kFewestIntervals = 500;
 constexpr std::uint64_t kFewestQuiet = 20;  // events in quiet areas
 constexpr int kMostSteps = 12;
-constexpr double kClose = 0.004;  // relative distance of matched numbers
-constexpr double kChange = 1.15;  // of a parameter, for derivatives
-constexpr double kWidest = 0.5;   // half a 95 % interval, in units of the logarithm
+constexpr double kClose = 0.004;         // relative distance of matched numbers
+constexpr double kChange = 1.15;         // of a parameter, for derivatives
+constexpr double kWidestInterval = 0.5;  // half a 95 % interval, in units of the logarithm
 constexpr double kMaxExcess = 3;  // simulated events in quiet areas, in recorded ones, if the simulated scene is wrong
 
 /// What the thresholds and the refractory period are matched to.
@@ -36,7 +36,7 @@ struct Moments {
         shortest_us(s.intervals_us.quantile(0.01)) {}
 
   Eigen::Vector3d logarithms() const { return {std::log(on), std::log(off), std::log(shortest_us)}; }
-  bool enough() const { return std::min(on, off) >= static_cast<double>(kFewest); }
+  bool enough() const { return std::min(on, off) >= static_cast<double>(kFewestOfPolarity); }
 };
 
 class Fitter {
@@ -49,7 +49,7 @@ class Fitter {
   SimulationFit run() {
     if (!target_.enough()) {
       const std::string why = fmt::format("the recording has {} ON and {} OFF events; {} of each are necessary",
-                                          real_.on, real_.events - real_.on, kFewest);
+                                          real_.on, real_.events - real_.on, kFewestOfPolarity);
       for (const char* name :
            {"contrast_threshold_on", "contrast_threshold_off", "refractory_period_us", "leak_rate_hz",
             "readout.time_stamp_us", "readout.row_wait_us", "readout.row_time_us", "readout.column_coupling"})
@@ -219,7 +219,7 @@ class Fitter {
 
   void add_interval(const char* name, const char* unit, double value, double deviation) {
     const double reach = kNormalQuantile * deviation;
-    if (!(reach < kWidest))
+    if (!(reach < kWidestInterval))
       return unknown(name, unit, "the numbers of events depend too little on it, or vary too much");
     fit_.estimates.push_back(Estimate::found(name, unit, value, value * std::exp(-reach), value * std::exp(reach),
                                              "simulation of the scene"));

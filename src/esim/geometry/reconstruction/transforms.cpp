@@ -16,7 +16,7 @@ namespace {
 using nlohmann::json;
 
 /// One frame of a file, or what all frames share.
-struct Section {
+struct JsonObject {
   const std::filesystem::path& file;
   std::string name;
   const json& object;
@@ -66,13 +66,13 @@ template <typename Body>
 void for_each_frame(const json& root, const std::filesystem::path& file, const Body& body) {
   std::size_t index = 0;
   for (const json& frame : root["frames"]) {
-    const Section section{file, fmt::format("frames[{}]", index++), frame};
+    const JsonObject section{file, fmt::format("frames[{}]", index++), frame};
     if (!frame.is_object()) section.fail("must be an object with a transform_matrix");
     body(section);
   }
 }
 
-SE3 pose_of(const Section& frame) {
+SE3 pose_of(const JsonObject& frame) {
   constexpr const char* kKey = "transform_matrix";
   const json* const rows = frame.find(kKey);
   const auto refuse = [&] { frame.fail(fmt::format("{} must be a matrix of 4 x 4 numbers, camera to world", kKey)); };
@@ -104,7 +104,7 @@ struct Intrinsics {
   auto operator<=>(const Intrinsics&) const = default;
 };
 
-Intrinsics intrinsics_of(const Section& frame, const Section& shared) {
+Intrinsics intrinsics_of(const JsonObject& frame, const JsonObject& shared) {
   const auto number = [&](const char* key) {
     const auto own = frame.number(key);
     return own ? own : shared.number(key);
@@ -165,7 +165,7 @@ std::vector<TransformsFrame> read_transforms_frames(const std::filesystem::path&
   const json root = load(file);
   std::vector<TransformsFrame> frames;
   std::size_t times = 0, timestamps = 0;
-  for_each_frame(root, file, [&](const Section& frame) {
+  for_each_frame(root, file, [&](const JsonObject& frame) {
     times += frame.number("time").has_value();
     timestamps += frame.number("timestamp").has_value();
     frames.push_back({frame.text("file_path").value_or(""), std::nullopt, pose_of(frame)});
@@ -178,16 +178,16 @@ std::vector<TransformsFrame> read_transforms_frames(const std::filesystem::path&
   }
   if (key == nullptr) return frames;
   std::size_t index = 0;
-  for_each_frame(root, file, [&](const Section& frame) { frames[index++].time_s = frame.number(key); });
+  for_each_frame(root, file, [&](const JsonObject& frame) { frames[index++].time_s = frame.number(key); });
   return frames;
 }
 
 std::vector<CalibratedCamera> read_transforms_calibration(const std::filesystem::path& file) {
   const json root = load(file);
-  const Section shared{file, "the file", root};
+  const JsonObject shared{file, "the file", root};
   std::set<Intrinsics> known;
   std::vector<CalibratedCamera> cameras;
-  for_each_frame(root, file, [&](const Section& frame) {
+  for_each_frame(root, file, [&](const JsonObject& frame) {
     const Intrinsics c = intrinsics_of(frame, shared);
     if (!known.insert(c).second) return;
     try {

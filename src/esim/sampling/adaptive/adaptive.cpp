@@ -16,8 +16,6 @@ namespace {
 
 using Reason = TileCourse::Reason;
 
-constexpr double kNsPerS = 1e9;
-
 // A round takes the tiles that are due within this fraction of the typical interval.
 constexpr double kRound = 0.5;
 
@@ -240,7 +238,7 @@ void AdaptiveSampler::watch() {
     for (int distance = 0; distance <= kReach; ++distance) {
       const double way = gap(distance) + options_.max_motion_px;
       tile.arrival[static_cast<std::size_t>(distance)] =
-          tile.speed > 0 ? tile.last() + static_cast<TimeNs>(std::min(way / tile.speed * kNsPerS, 1e18)) : kNever;
+          tile.speed > 0 ? tile.last() + static_cast<TimeNs>(std::min(way / tile.speed * 1e9, 1e18)) : kNever;
     }
   }
   for (const std::uint32_t index : asked_) {

@@ -7,8 +7,6 @@
 namespace esim::inline sampling {
 namespace {
 
-constexpr double kNsPerS = 1e9;
-
 // One in kAuditOneIn intervals is audited.
 constexpr std::uint32_t kAuditOneIn = 128;
 
@@ -116,7 +114,7 @@ void TilePlanner::settle(TileCourse& tile, std::uint32_t index, const ErrorLimit
 void TilePlanner::plan(TileCourse& tile, const ErrorLimits& limits) const {
   const TileTimeline& timeline = tile.timeline;
   const std::size_t last = timeline.size() - 1;
-  const double way = max_motion_px_ / tile.speed * kNsPerS;  // ns
+  const double way = max_motion_px_ / tile.speed * 1e9;  // ns
   // Initially nothing is known: start with short steps.
   double step = 0.25 * std::min({way, static_cast<double>(longest_), static_cast<double>(span_.end - span_.start)});
   if (last >= 2) {

@@ -20,8 +20,8 @@ namespace {
 constexpr double kMaxPerSecond = 50000;  // maximum rate of reconstructions, whatever the motion
 constexpr double kMaxUnseen = 0.01;      // maximum fraction of pixels hidden from both keyframes, except at edges
 
-// The first of every kAuditOneIn intervals between keyframes is compared with the truth.
-constexpr std::int64_t kAuditOneIn = 6;
+// The first of every kAuditEvery intervals between keyframes is compared with the truth.
+constexpr std::int64_t kAuditEvery = 6;
 
 /// A keyframe, and the speed of its image.
 struct MovingKeyframe {
@@ -223,7 +223,7 @@ class KeyframeSampler final : public Sampler {
     const double steps = std::ceil(to_seconds(interval) * std::min(fastest / options_.lambda, kMaxPerSecond));
     steps_ = static_cast<TimeNs>(std::clamp(steps, 1.0, static_cast<double>(interval)));
     step_ = 0;
-    if (intervals_++ % kAuditOneIn == 0 && interval > 1) {
+    if (intervals_++ % kAuditEvery == 0 && interval > 1) {
       const auto [share, unused] = random_.uniforms(0, static_cast<std::uint64_t>(intervals_));
       const TimeNs t = before_.t() + 1 + static_cast<TimeNs>(share * static_cast<double>(interval - 1));
       request_ = SampleRequest{t, {sensor()}};

@@ -9,7 +9,7 @@ namespace esim::inline backends::inline raycast {
 namespace {
 
 using D = EightFloats;
-constexpr int kVector = static_cast<int>(hn::MaxLanes(D()));
+constexpr int kColumns = static_cast<int>(hn::MaxLanes(D()));
 
 /// A linear function on a rectangle of bearings: its value in the middle, and how much it differs at most.
 struct OnRectangle {
@@ -90,7 +90,7 @@ void CellSurfaces::scan(const ScreenTriangle& triangle, const BearingBounds& bou
   const auto id = static_cast<std::uint32_t>(triangles_.size());
   const std::size_t found_before = found_count_;
   for (int row = first_row; row <= last_row; ++row) {
-    for (int column = first_column / kVector * kVector; column <= last_column; column += kVector) {
+    for (int column = first_column / kColumns * kColumns; column <= last_column; column += kColumns) {
       const auto k = static_cast<std::size_t>(row * ImageCell::kWidth + column);
       const V x = hn::Load(d, &cell.x[k]), y = hn::Load(d, &cell.y[k]);
       const V depth = hn::MulAdd(zx, x, hn::MulAdd(zy, y, z1));
@@ -107,14 +107,14 @@ void CellSurfaces::scan(const ScreenTriangle& triangle, const BearingBounds& bou
         fills = hn::And(fills, hn::Gt(weight, reach));
       }
       unsigned bits = bits_of(visible);
-      const int skipped = std::max(0, first_column - column), kept = std::min(kVector, last_column - column + 1);
+      const int skipped = std::max(0, first_column - column), kept = std::min(kColumns, last_column - column + 1);
       bits &= ((1U << kept) - 1) & ~((1U << skipped) - 1);
       if (bits == 0) continue;
       fills = hn::And(fills, visible);
       const unsigned fills_bits = bits_of(fills);
       // Only pixels that are wanted are read later.
       hn::Store(hn::IfThenElse(fills, hn::Max(hidden, farthest), hidden), d, &hidden_below_[k]);
-      if (found_.size() < found_count_ + kVector) found_.resize(2 * found_.size() + 1024);
+      if (found_.size() < found_count_ + kColumns) found_.resize(2 * found_.size() + 1024);
       alignas(64) std::array<float, 8> nearest_values;
       hn::Store(nearest, d, nearest_values.data());
       for (; bits != 0; bits &= bits - 1) {

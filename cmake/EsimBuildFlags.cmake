@@ -9,8 +9,9 @@ set(CMAKE_EXPORT_COMPILE_COMMANDS ON)
 
 add_library(esim_build_flags INTERFACE)
 # g++ 12 reports restrict, maybe-uninitialized, stringop-overflow and array-bounds in the standard library's own strings and optionals.
-target_compile_options(esim_build_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion
-                                                  -Wno-sign-conversion -Wno-restrict -Wno-maybe-uninitialized -Wno-stringop-overflow -Wno-array-bounds -fno-math-errno -fno-trapping-math -fopenmp-simd)
+target_compile_options(esim_build_flags INTERFACE -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wno-sign-conversion
+                       $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict;-Wno-maybe-uninitialized;-Wno-stringop-overflow;-Wno-array-bounds>
+                       -fno-math-errno -fno-trapping-math -fopenmp-simd)
 # g++ 13 and later report references to objects that exist for the whole program, such as the formats.
 if(CMAKE_CXX_COMPILER_ID STREQUAL GNU AND CMAKE_CXX_COMPILER_VERSION VERSION_GREATER_EQUAL 13)
   target_compile_options(esim_build_flags INTERFACE -Wno-dangling-reference)

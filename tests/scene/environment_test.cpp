@@ -1,6 +1,7 @@
 // Environments against integration over their images.
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <filesystem>
 #include <numbers>

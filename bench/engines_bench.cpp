@@ -1,14 +1,17 @@
-// The ray caster and the rasteriser on all processors, and OpenGL, on the same scenes from the same places: one full
-// frame (E, Z and V), 16 samples per pixel as in the shipped scenarios. Names: SCENE/WIDTHxHEIGHT/ENGINE. The label of
-// gl is its device. compare_engines.py makes tables of it.
+// The engines of the processor, on all of it, and OpenGL, on the same scenes from the same places: one full frame (E, Z
+// and V). Meshes, by the ray caster and the rasteriser, have 16 samples per pixel as in the shipped scenarios; splats
+// are those of the room. Names: SCENE/WIDTHxHEIGHT/ENGINE. The label of gl is its device. compare_engines.py makes
+// tables of it.
 #include <benchmark/benchmark.h>
 
 #include <filesystem>
 #include <functional>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 
+#include "esim/scene/splats/splat_file.h"
 #include "generated_room.h"
 #include "render/scenes.h"
 #include "render_frames.h"
@@ -35,12 +38,14 @@ Mesh shipped(const std::string& file) {
   return load_mesh(std::filesystem::path(ESIM_SCENES) / file, [](const std::string&) {});
 }
 
+/// Where scenes/room.yaml and scenes/splats.yaml start.
+const SE3 kRoomStart = pose({2.016, -1.649, 1.511}, {0.61495, -0.68379, -0.28614, 0.26905});
+
 /// The shipped rooms from where their scenarios start, and generated ones of many triangles.
 std::vector<View> views() {
   const SE3 middle = test::moving_camera().T_world_body;
   return {
-      {"room", [] { return shipped("room/room.obj"); },
-       pose({2.016, -1.649, 1.511}, {0.61495, -0.68379, -0.28614, 0.26905})},
+      {"room", [] { return shipped("room/room.obj"); }, kRoomStart},
       {"studio_room", [] { return shipped("studio_room/baked.glb"); },
        pose({1.557, -1.991, 1.509}, {-0.63155, 0.73724, 0.17634, -0.16289})},
       {"generated_127k", [] { return bench::generated_room(127000); }, middle},
@@ -99,21 +104,55 @@ void gl(benchmark::State& state, const View& view, const Camera& camera) {
   bench::render_frames(state, *renderer, camera, motion_from(view.T_world_camera));
 }
 
+std::shared_ptr<const Splats> room_splats() {
+  Splats splats = load_splats(std::filesystem::path(ESIM_SCENES) / "splats/room.spz", [](const std::string&) {});
+  splats.light = SplatLight::linear;
+  splats.filter = SplatFilter::mip;
+  return std::make_shared<const Splats>(std::move(splats));
+}
+
+void splats_on_processor(benchmark::State& state, const Camera& camera) {
+  const Workers workers(static_cast<int>(std::thread::hardware_concurrency()));
+  const auto renderer = make_splat_renderer(build_splat_scene({{room_splats()}}), {}, camera, workers);
+  bench::render_frames(state, *renderer, camera, motion_from(kRoomStart));
+}
+
+void splats_gl(benchmark::State& state, const Camera& camera) {
+  if (!test::has_gl()) return state.SkipWithError("OpenGL is not available");
+  const auto renderer = make_gl_splat_renderer({{room_splats()}}, {}, camera, std::nullopt);
+  state.SetLabel(renderer->traits().device);
+  bench::render_frames(state, *renderer, camera, motion_from(kRoomStart));
+}
+
+/// SCENE/WIDTHxHEIGHT/ENGINE, of `run(state, camera)`.
+template <typename Run>
+void add(const std::string& scene, const std::string& engine, const Camera& camera, const Run& run) {
+  const std::string name =
+      scene + "/" + std::to_string(camera.width) + "x" + std::to_string(camera.height) + "/" + engine;
+  benchmark::RegisterBenchmark(name.c_str(), [=](benchmark::State& state) { run(state, camera); })
+      ->UseRealTime()
+      ->Unit(benchmark::kMillisecond);
+}
+
+/// All sizes of a scene, one engine after the other.
+template <typename AddEngines>
+void add_sizes(const AddEngines& add_engines) {
+  for (const auto& [width, height] : {std::pair{346, 260}, std::pair{1280, 720}})
+    add_engines(Camera::from_fov(width, height, 75.0 * std::numbers::pi / 180.0));
+}
+
 const bool kRegistered = [] {
-  constexpr double kFieldOfView = 75.0 * std::numbers::pi / 180.0;
   for (const View& view : views()) {
-    for (const auto& [width, height] : {std::pair{346, 260}, std::pair{1280, 720}}) {
-      const Camera camera = Camera::from_fov(width, height, kFieldOfView);
-      for (const auto& [engine, function] :
-           {std::pair{"raycast", &raycast}, std::pair{"raster", &raster}, std::pair{"gl", &gl}}) {
-        const std::string name = view.name + "/" + std::to_string(width) + "x" + std::to_string(height) + "/" + engine;
-        benchmark::RegisterBenchmark(name.c_str(),
-                                     [=, run = function](benchmark::State& state) { run(state, view, camera); })
-            ->UseRealTime()
-            ->Unit(benchmark::kMillisecond);
-      }
-    }
+    add_sizes([&](const Camera& camera) {
+      for (const auto& [engine, run] :
+           {std::pair{"raycast", &raycast}, std::pair{"raster", &raster}, std::pair{"gl", &gl}})
+        add(view.name, engine, camera, [=, run = run](auto& state, const Camera& model) { run(state, view, model); });
+    });
   }
+  add_sizes([](const Camera& camera) {
+    add("room_splats", "processor", camera, splats_on_processor);
+    add("room_splats", "gl", camera, splats_gl);
+  });
   return true;
 }();
 

@@ -136,12 +136,21 @@ TEST_P(Glossy, ReflectsSunsAndLampsByTheEquations) {
     lighting.points.push_back({lamp.cast<float>(), 1.5F});
     const Sample sample = seen(square(shining(surface)), lighting, camera, GetParam());
     for_each_seen(sample, kModel, camera, [&](double irradiance, const Vector3d& point, const Vector3d& v) {
-      const Vector3d n = Vector3d::UnitZ(), to_lamp = lamp - point, l = to_lamp.normalized(), s = -sun.normalized();
-      const double expected = 0.8 * n.dot(s) * surface.reflectance(n, s, v) +
-                              1.5 / to_lamp.squaredNorm() * n.dot(l) * surface.reflectance(n, l, v);
+      const auto reflected = [&](const Vector3d& p) {
+        const Vector3d n = Vector3d::UnitZ(), to_lamp = lamp - p, l = to_lamp.normalized(), s = -sun.normalized();
+        const Vector3d to_camera = (camera.T_world_body.translation - p).normalized();
+        return 0.8 * n.dot(s) * surface.reflectance(n, s, to_camera) +
+               1.5 / to_lamp.squaredNorm() * n.dot(l) * surface.reflectance(n, l, to_camera);
+      };
+      const double expected = reflected(point);
       // Sharp highlights depend on the last digits of the point.
-      ASSERT_NEAR(irradiance, expected, 2e-4 * expected / std::pow(surface.roughness, 2) * 0.1 + 1e-4 * expected)
-          << surface.metallic << ", " << surface.roughness;
+      double tolerance = 2e-4 * expected / std::pow(surface.roughness, 2) * 0.1 + 1e-4 * expected;
+      if (GetParam() == Engine::gl) {  // graphics cards round vertices to 1/256 of a pixel (GL_SUBPIXEL_BITS)
+        const double step = (camera.T_world_body.translation - point).norm() / kModel.fx / v.z() / 256;
+        for (const Vector3d& side : {Vector3d(step, 0, 0), Vector3d(0, step, 0)})
+          tolerance += std::abs(reflected(point + side) - reflected(point - side)) / 2;
+      }
+      ASSERT_NEAR(irradiance, expected, tolerance) << surface.metallic << ", " << surface.roughness;
     });
   }
 }

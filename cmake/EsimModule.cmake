@@ -6,12 +6,16 @@
 #
 # UNITY compiles several .cpp files at once, which takes half the time where they include the same heavy headers. It is
 # not for folders that compute with floating-point numbers: what the compiler contracts into one instruction could then
-# depend on which files are compiled together, and with it the last bit of an event's time.
-option(ESIM_UNITY "Compile several files of a folder at once" ON)
+# depend on which files are compiled together, and with it the last bit of an event's time. Builds with sanitizers, which
+# only tests use, compile all folders so.
+set(ESIM_UNITY ON CACHE STRING "Compile several files of a folder at once: ON, OFF, or ALL folders")
 function(esim_unity target)
-  set_target_properties(${target} PROPERTIES UNITY_BUILD ${ESIM_UNITY} UNITY_BUILD_BATCH_SIZE 10)
+  if(NOT ESIM_UNITY)
+    return()
+  endif()
+  set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 10)
   # In a unit of several files, GCC takes the types in their unnamed namespaces for those of a header.
-  if(ESIM_UNITY AND CMAKE_CXX_COMPILER_ID STREQUAL GNU)
+  if(CMAKE_CXX_COMPILER_ID STREQUAL GNU)
     target_compile_options(${target} PRIVATE -Wno-subobject-linkage)
   endif()
 endfunction()
@@ -31,7 +35,7 @@ function(esim_module name)
   target_link_libraries(esim_${target} PUBLIC ${ARG_DEPENDS} ${ARG_PUBLIC} PRIVATE ${ARG_PRIVATE} fmt::fmt esim_build_flags)
   set_target_properties(esim_${target} PROPERTIES EXPORT_NAME ${target} POSITION_INDEPENDENT_CODE ON)
   esim_precompile(esim_${target} esim_precompiled)
-  if(ARG_UNITY)
+  if(ARG_UNITY OR ESIM_UNITY STREQUAL "ALL")
     esim_unity(esim_${target})
   endif()
   set_property(GLOBAL APPEND PROPERTY ESIM_TARGETS esim_${target})

@@ -102,7 +102,7 @@ class Sensor:
         axes: str = "opencv",
         supersampling: Int = 1,
         margin_px: Int = 0,
-        lambda_px: float = 0.5,
+        lambda_px: float | None = None,
         seed: Int = 0,
         threads: Int = 0,
         **options: Any,

@@ -34,11 +34,12 @@ class Sensor:
         along -z; also USD and Blender), "ros" (x forward, y left, z up), or "unreal" (x forward, y right, z up; left-handed,
         also the world).
     supersampling : int
-        Pixels of a frame per pixel of the sensor, along each side: 2 or 3 give sharper events than 1.
+        Pixels of a frame per pixel of the sensor, along each side: 2 to 4 give sharper events than 1.
     margin_px : int
         Border of frames around the sensor's image, in its pixels: what comes into view is then already known.
-    lambda_px : float
-        Motion between two images that are made between frames; brightness is interpolated linearly there.
+    lambda_px : float, optional
+        Motion between two images that are made between frames, in pixels of the sensor; brightness is interpolated linearly
+        there. Default: one pixel of the frames, but at most 0.5.
     seed, threads, **options
         As for `EventCamera`.
 
@@ -56,7 +57,7 @@ class Sensor:
         axes="opencv",
         supersampling=1,
         margin_px=0,
-        lambda_px=0.5,
+        lambda_px=None,
         seed=0,
         threads=0,
         **options,
@@ -66,9 +67,12 @@ class Sensor:
         if preset is not None:
             options = {"preset": preset, **options}
         self._axes = _checks.one_of(axes, "axes", tuple(_FROM_OPENCV))
+        supersampling = _checks.whole(supersampling, "supersampling", 1, 8)
+        if lambda_px is None:
+            lambda_px = min(0.5, 1 / supersampling)
         self._core = _core.Sensor(
             to_overrides({f"camera.{key}": value for key, value in camera.items()}),
-            _checks.whole(supersampling, "supersampling", 1, 8),
+            supersampling,
             _checks.whole(margin_px, "margin_px", 0, 1000),
             _checks.number(lambda_px, "lambda_px", low=0.01, high=100),
             to_overrides({f"event_camera.{key}": value for key, value in options.items()}),

@@ -1,9 +1,10 @@
-// Reads arbitrary bytes from libFuzzer as a file of one format: the result is records or a UserError, in bounded memory
-// and time.
+// Reads arbitrary bytes from libFuzzer as a file of the format that the program's name names, fuzz_NAME: the result is
+// records or a UserError, in bounded memory and time.
 #include <sys/mman.h>
 #include <unistd.h>
 
 #include <cstdlib>
+#include <filesystem>
 #include <string>
 
 #include "esim/core/error.h"
@@ -28,10 +29,11 @@ class MemoryFile {
   int descriptor_;
 };
 
+const esim::Format* fuzzed = nullptr;
+
 void read(const std::string& path, const esim::ReadOptions& options) {
-  const esim::Format& format = esim::format_named(ESIM_FUZZED_FORMAT);
   try {
-    esim::CheckedSource source(format.open(path, options), path, options);
+    esim::CheckedSource source(fuzzed->open(path, options), path, options);
     while (source.next() != nullptr) {
     }
   } catch (const esim::UserError&) {  // what a damaged file is meant to be
@@ -39,6 +41,12 @@ void read(const std::string& path, const esim::ReadOptions& options) {
 }
 
 }  // namespace
+
+extern "C" int LLVMFuzzerInitialize(int*, char*** arguments) {
+  const std::string program = std::filesystem::path((*arguments)[0]).filename();
+  fuzzed = &esim::format_named(program.substr(program.find('_') + 1));
+  return 0;
+}
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   const MemoryFile file(data, size);

@@ -164,3 +164,15 @@ def test_depth_of_the_sky_may_be_zero_or_infinite():
             depth[:10] = sky
             events.append(sensor.step(0.01 * k, E, depth, pose(0.02 * k)))
     np.testing.assert_array_equal(events[1], events[3])
+
+
+def test_images_are_made_at_distances_of_a_pixel_of_the_frames():
+    def made(**options):
+        sensor = make(supersampling=4, **options)
+        frames = [[np.repeat(np.repeat(image, 4, 0), 4, 1) for image in wall(x)] for x in MOVED]
+        return [sensor.step(0.01 * k, *frame, pose(x)) for k, (frame, x) in enumerate(zip(frames, MOVED))]
+
+    default = made()
+    for a, b in zip(default, made(lambda_px=0.25)):
+        np.testing.assert_array_equal(a, b)
+    assert any(not np.array_equal(a, b) for a, b in zip(default, made(lambda_px=0.5)))

@@ -15,7 +15,7 @@
 namespace esim::inline fit {
 namespace {
 
-constexpr double kFewestEvents = 200;
+constexpr double kFewestOn = 200;
 constexpr double kPeriodic = 0.5;       // coefficient of variation of a pixel's intervals; 1: Poisson
 constexpr double kWithoutNoise = 0.02;  // OFF events as a fraction of the ON events
 // A hot pixel: standard deviations above the median, and times the median.
@@ -24,7 +24,7 @@ constexpr TimeNs kStretch = 500 * kNsPerMs;
 constexpr double kFewestStretches = 20;
 const double kLn10 = std::numbers::ln10;
 
-const char* const kSource = "events in constant light";
+const char* const kConstantLight = "events in constant light";
 
 /// A pixel of which log10 of the rate is known, with the variance of its error.
 struct KnownRate {
@@ -61,13 +61,13 @@ double surprisal(const LogNormal& d, const std::vector<KnownRate>& known, std::s
 /// With a normal error.
 Estimate with_error(const char* name, const char* unit, double value, double error) {
   const double reach = kNormalQuantile * error;
-  return Estimate::found(name, unit, value, std::max(0.0, value - reach), value + reach, kSource);
+  return Estimate::found(name, unit, value, std::max(0.0, value - reach), value + reach, kConstantLight);
 }
 
 /// 10^value, with an error of the value; `quantile` of its distribution.
 Estimate of_log10(const char* name, const char* unit, double value, double error, double quantile) {
   return Estimate::found(name, unit, std::pow(10, value), std::pow(10, value - quantile * error),
-                         std::pow(10, value + quantile * error), kSource);
+                         std::pow(10, value + quantile * error), kConstantLight);
 }
 
 }  // namespace
@@ -141,7 +141,7 @@ BackgroundFit::Kept BackgroundFit::separate_hot_pixels(double duration_s, Result
     }
   }
   if (kept.intervals > 0) kept.variation = std::sqrt(std::max(0.0, squares / kept.intervals));
-  result.hot_pixels = fraction_estimate("hot_pixels", hot.size(), pixels_.size(), kSource);
+  result.hot_pixels = fraction_estimate("hot_pixels", hot.size(), pixels_.size(), kConstantLight);
   constexpr std::size_t kFewestHot = 5;
   if (hot.size() < kFewestHot) {
     const std::string why =
@@ -231,7 +231,7 @@ void BackgroundFit::fit_moments(const Kept& kept, double duration_s, double rati
   }
   const Jackknifed &rate = (*found)[0], &spread = (*found)[1];
   result.leak_rate = Estimate::found("leak_rate_hz", "Hz", std::max(0.0, rate.value), std::max(0.0, rate.low()),
-                                     std::max(0.0, rate.high()), kSource);
+                                     std::max(0.0, rate.high()), kConstantLight);
   const double stretches = duration_s / to_seconds(kStretch);
   if (rate.low() <= 0 || stretches < kFewestStretches) {
     result.leak_decades = Estimate::unknown(
@@ -239,8 +239,9 @@ void BackgroundFit::fit_moments(const Kept& kept, double duration_s, double rati
         rate.low() <= 0 ? "the leak cannot be told from the noise" : "noise hides it in recordings shorter than 10 s");
     return;
   }
-  result.leak_decades = Estimate::found("leak_mismatch_decades", "", std::sqrt(spread.value),
-                                        std::sqrt(std::max(0.0, spread.low())), std::sqrt(spread.high()), kSource);
+  result.leak_decades =
+      Estimate::found("leak_mismatch_decades", "", std::sqrt(spread.value), std::sqrt(std::max(0.0, spread.low())),
+                      std::sqrt(spread.high()), kConstantLight);
 }
 
 BackgroundFit::Result BackgroundFit::finish(double duration_s, double ratio) const {
@@ -258,10 +259,10 @@ BackgroundFit::Result BackgroundFit::finish(double duration_s, double ratio) con
   result.noise = with_error("shot_noise_hz", "Hz", 2 * result.off_hz, 2 * off_error);
   if (off == 0) result.noise.high = 2 * kNoneSeen / (n * duration_s);
 
-  if (on < kFewestEvents) {
+  if (on < kFewestOn) {
     const std::string why =
         fmt::format("the recording has only {:.0f} ON events of pixels that are not hot; at least {:.0f} are necessary",
-                    on, kFewestEvents);
+                    on, kFewestOn);
     result.leak_rate = Estimate::unknown("leak_rate_hz", "Hz", why);
     result.leak_decades = Estimate::unknown("leak_mismatch_decades", "", why);
   } else if (kept.regular && off < kWithoutNoise * on && kept.variation < kPeriodic) {

@@ -16,12 +16,12 @@
 namespace esim::inline fit {
 namespace {
 
-constexpr float kUnknown = std::numeric_limits<float>::quiet_NaN();
+constexpr float kNoBrightness = std::numeric_limits<float>::quiet_NaN();
 constexpr TimeNs kImagesPerEvent = 2;
 constexpr double kShort = 3;                // refractory periods: events nearer to each other miss too much
 constexpr double kTypicalThreshold = 0.25;  // ln
 constexpr std::uint32_t kManyEvents = 20;   // of the neighbours of a pixel that is dead without events
-const char* const kSource = "events and images of a moving scene";
+const char* const kMovingScene = "events and images of a moving scene";
 
 }  // namespace
 
@@ -43,7 +43,7 @@ void ContrastFit::add(TimeNs t, const Image<float>& intensity, EventSpan events)
   image.logs.resize(pixels_.size());
   const auto offset = static_cast<float>(options_.offset);
   std::transform(intensity.pixels().begin(), intensity.pixels().end(), image.logs.begin(), [offset](float value) {
-    return value > 0 && std::isfinite(value) ? std::log(value + offset) : kUnknown;
+    return value > 0 && std::isfinite(value) ? std::log(value + offset) : kNoBrightness;
   });
   images_.push_back(std::move(image));
   for (const Event& event : events) look_at_images(event);
@@ -158,7 +158,7 @@ ContrastFit::Result ContrastFit::finish() {
   const auto estimate = [&](const char* name, const char* unit, PixelThresholds::Value which, double factor) {
     if (problem) return Estimate::unknown(name, unit, *problem);
     const Jackknifed& found = pixels.values()[which];
-    return Estimate::found(name, unit, factor * found.value, factor * found.low(), factor * found.high(), kSource);
+    return Estimate::found(name, unit, factor * found.value, factor * found.low(), factor * found.high(), kMovingScene);
   };
   const auto root = [&](const char* name, PixelThresholds::Value which) {  // of a variance
     if (!problem && !pixels.knows_spread())
@@ -208,7 +208,7 @@ Estimate ContrastFit::find_dead_pixels() const {
       dead += pixels_(x, y).events == 0;
     }
   }
-  return fraction_estimate("dead_pixels", dead, watched, kSource);
+  return fraction_estimate("dead_pixels", dead, watched, kMovingScene);
 }
 
 }  // namespace esim::inline fit

@@ -37,9 +37,9 @@ constexpr double kClearScan = 0.9;        // concentration
 
 struct Interrupted {};
 
-class Fitter {
+class SensorFitter {
  public:
-  Fitter(const FitInput& input, const FitOptions& options) : input_(input), options_(options) {
+  SensorFitter(const FitInput& input, const FitOptions& options) : input_(input), options_(options) {
     base_ = preset_options(options.base);
     fit_.base = options.base;
     work_ = static_cast<double>(2 * input.moving.size() + input.constant.size() + input.flicker.size() +
@@ -418,7 +418,7 @@ class Fitter {
 
 std::optional<SensorFit> fit_sensor(const FitInput& input, const FitOptions& options) {
   try {
-    return Fitter(input, options).run();
+    return SensorFitter(input, options).run();
   } catch (const Interrupted&) {
     return std::nullopt;
   }

@@ -9,7 +9,7 @@
 namespace esim::inline fit {
 namespace {
 
-constexpr std::size_t kFewestIntervals = 100;
+constexpr std::size_t kFewestPairs = 100;
 constexpr double kStepDistance = 1.63;  // Kolmogorov-Smirnov at 1 %, times the root of the number
 // Quantiles of the exponential distribution, for 95 %, and its mean.
 constexpr double kLow = 0.0253, kHigh = 3.6889;
@@ -44,9 +44,9 @@ ShortestIntervals::Result ShortestIntervals::finish(TimeNs stamp_unit) const {
     result.refractory = Estimate::unknown("refractory_period_us", "us", std::move(why));
     return result;
   };
-  if (sorted.size() < kFewestIntervals) {
+  if (sorted.size() < kFewestPairs) {
     return unknown(
-        fmt::format("only {} pairs of events of a pixel; at least {} are necessary", sorted.size(), kFewestIntervals));
+        fmt::format("only {} pairs of events of a pixel; at least {} are necessary", sorted.size(), kFewestPairs));
   }
   const std::vector<double>& t = result.intervals_us;
   const auto n = static_cast<double>(t.size() - 1);

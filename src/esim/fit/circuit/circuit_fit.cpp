@@ -22,12 +22,12 @@ using Eigen::MatrixXd, Eigen::VectorXd;
 using enum CircuitModel::Index;
 using ModelIndex = CircuitModel::Index;
 
-constexpr double kWidest = 0.7;       // half a 95 % interval, in units of the logarithm: a factor of 2
-constexpr double kUnknown = 3;        // standard deviation of the logarithm of a parameter before the fit
-constexpr double kFullReadout = 0.5;  // part of the readout's rate above which it delays and loses events
-constexpr double kBusy = 0.5;         // part of the time in the refractory period, above which it hides the circuit
-constexpr double kStrange = 4;        // standard deviations of the sum of squares
-constexpr double kImpossible = 10;    // standard deviations of the recordings
+constexpr double kWidest = 0.7;          // half a 95 % interval, in units of the logarithm: a factor of 2
+constexpr double kUnknownDeviation = 3;  // standard deviation of the logarithm of a parameter before the fit
+constexpr double kFullReadout = 0.5;     // part of the readout's rate above which it delays and loses events
+constexpr double kBusy = 0.5;            // part of the time in the refractory period, above which it hides the circuit
+constexpr double kStrange = 4;           // standard deviations of the sum of squares
+constexpr double kImpossible = 10;       // standard deviations of the recordings
 
 struct Parameter {
   const char* name;
@@ -40,9 +40,9 @@ constexpr std::array<Parameter, CircuitModel::kParameters> kNames{{{"contrast_th
                                                                    {"circuit.photodiode_charge_e", "electrons"},
                                                                    {"circuit.dark_current_fa", "fA"}}};
 
-class Fitter {
+class CircuitFitter {
  public:
-  explicit Fitter(const CircuitInput& input) : input_(input), base_(input.base) {}
+  explicit CircuitFitter(const CircuitInput& input) : input_(input), base_(input.base) {}
 
   CircuitFit run() {
     plan();
@@ -158,7 +158,7 @@ class Fitter {
       t.start[k] = std::log(known.value);
       t.known_precision[k] = std::pow(2 * kNormalQuantile / std::log(known.high / known.low), 2);
     }
-    t.precision = t.known_precision.array() + 1 / (kUnknown * kUnknown);
+    t.precision = t.known_precision.array() + 1 / (kUnknownDeviation * kUnknownDeviation);
     t.grid = has_lamps_ && reasons_[kFollower].empty();
     return t;
   }
@@ -292,6 +292,6 @@ class Fitter {
 
 }  // namespace
 
-CircuitFit fit_circuit(const CircuitInput& input) { return Fitter(input).run(); }
+CircuitFit fit_circuit(const CircuitInput& input) { return CircuitFitter(input).run(); }
 
 }  // namespace esim::inline fit

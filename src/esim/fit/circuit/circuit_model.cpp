@@ -16,7 +16,7 @@ constexpr double kSoft = 0.2;  // of the thresholds: the transition of events_of
 // Of a pixel, before and while they count: ON and OFF events of a lamp, OFF events in constant light. At first, all
 // references are equally probable, which is not so later.
 constexpr double kSettlingEvents = 24, kLampEvents = 24, kSettlingNoise = 4, kNoiseEvents = 4;
-constexpr double kFewestPeriods = 12, kMostPeriods = 40, kLongest_s = 20;
+constexpr double kFewestCounted = 12, kMostCounted = 40, kLongest_s = 20;
 
 void set_value(EventCameraOptions& o, CircuitModel::Index k, double value) {
   switch (k) {
@@ -131,8 +131,8 @@ PixelCounts CircuitModel::simulate_lamp(const EventCameraOptions& o, std::size_t
   const double events = recorded_[k] + recorded_[k + 1];  // in a period
   const double response = TimeConstants(*o.circuit, light.lux).latency_s() * light.frequency_hz;
   const double settling =
-      std::clamp(std::ceil(std::max(kSettlingEvents / events, 4 * response)), kFewestPeriods, kMostPeriods);
-  const double extent = std::clamp(std::ceil(kLampEvents / events), kFewestPeriods, kMostPeriods);
+      std::clamp(std::ceil(std::max(kSettlingEvents / events, 4 * response)), kFewestCounted, kMostCounted);
+  const double extent = std::clamp(std::ceil(kLampEvents / events), kFewestCounted, kMostCounted);
   return simulate_counts(o, light, settling, extent, side, seed);
 }
 

@@ -14,12 +14,12 @@ namespace esim::inline fit {
 namespace {
 
 constexpr std::array kShaped{kRowSameUs, kRowLater, kColumnSameUs, kColumnLater, kEventsPerStamp};
-constexpr double kCap = 20;         // of the deviations of one statistic
-constexpr double kClear = 4;        // a sum of deviations lower by this is better
-constexpr double kAsGood = 2;       // a sum higher by at most this belongs to the interval: two standard deviations
-constexpr double kFinest_us = 0.1;  // finer time stamps are not rounded
-constexpr double kClearScan = 0.9;  // concentration
-constexpr double kFullest = 0.95;   // fraction of the time in which the arbiter reads rows
+constexpr double kCap = 20;           // of the deviations of one statistic
+constexpr double kCertain = 4;        // a sum of deviations lower by this is better
+constexpr double kAsGood = 2;         // a sum higher by at most this belongs to the interval: two standard deviations
+constexpr double kFinest_us = 0.1;    // finer time stamps are not rounded
+constexpr double kCertainScan = 0.9;  // concentration
+constexpr double kFullest = 0.95;     // fraction of the time in which the arbiter reads rows
 
 const std::vector<double> kTimes_us{0, 0.1, 0.2, 0.4, 0.8}, kCouplings{0, 0.25, 0.5, 0.75, 1};
 
@@ -110,7 +110,7 @@ void ReadoutSearch::run(EventCameraOptions& sensor) {
   estimates_.push_back(
       Estimate::found("readout.time_stamp_us", "us", stamp_us, stamp_us, stamp_us, "largest common divisor"));
   const double rate_mev_per_s = readout.rate_mev_per_s;
-  if (real_.scan && real_.scan->concentration > kClearScan) {
+  if (real_.scan && real_.scan->concentration > kCertainScan) {
     const double period_us = 1e6 * real_.scan->period_s;
     readout = {}, readout.scan_period_us = period_us;
     estimates_.push_back(
@@ -123,12 +123,12 @@ void ReadoutSearch::run(EventCameraOptions& sensor) {
   const double given = sum_of_deviations(sensor), without = sum_of_deviations(none);
   const std::size_t known = estimates_.size();
   search_rows(none);
-  if (best_ <= std::min(given, without) - kClear) {
+  if (best_ <= std::min(given, without) - kCertain) {
     sensor.readout = rows_;
     return;
   }
   estimates_.resize(known);
-  const bool removed = without <= given - kClear;
+  const bool removed = without <= given - kCertain;
   if (removed) sensor = none;
   const char* const why = removed
                               ? "rows share no time stamps; there is no arbiter of rows then"

@@ -39,9 +39,9 @@ struct Moments {
   bool enough() const { return std::min(on, off) >= static_cast<double>(kFewestOfPolarity); }
 };
 
-class Fitter {
+class ClipFitter {
  public:
-  Fitter(const EventCameraOptions& base, const SensorStatistics& real, const SimulatedStatistics& simulate)
+  ClipFitter(const EventCameraOptions& base, const SensorStatistics& real, const SimulatedStatistics& simulate)
       : base_(base), real_(real), target_(real), simulate_(simulate) {
     fit_.options = base;
   }
@@ -263,7 +263,7 @@ class Fitter {
 
 SimulationFit fit_by_simulation(const EventCameraOptions& base, const SensorStatistics& real,
                                 const SimulatedStatistics& simulate) {
-  return Fitter(base, real, simulate).run();
+  return ClipFitter(base, real, simulate).run();
 }
 
 std::string describe(const SimulationFit& fit) {

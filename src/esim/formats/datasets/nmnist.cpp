@@ -12,10 +12,10 @@
 namespace esim::inline formats {
 namespace {
 
-constexpr std::size_t kEventBytes = 5;
+constexpr std::size_t kNmnistEventBytes = 5;
 constexpr int kDelayRow = 240;
 constexpr std::int64_t kDelayUs = 1 << 13;
-constexpr std::int64_t kMaxUs = (1 << 23) - 1;
+constexpr std::int64_t kMaxNmnistUs = (1 << 23) - 1;
 constexpr int kMaxWidth = 256, kMaxHeight = kDelayRow;  // px
 
 class NmnistWriter final : public EventsWriter {
@@ -25,7 +25,7 @@ class NmnistWriter final : public EventsWriter {
   void write(EventSpan events) override {
     std::string& bytes = file_->buffer();
     const std::size_t before = bytes.size();
-    bytes.resize(before + events.size() * kEventBytes);
+    bytes.resize(before + events.size() * kNmnistEventBytes);
     char* out = bytes.data() + before;
     for (const Event& event : events) {
       const std::int64_t us = event.t / kNsPerUs;
@@ -73,12 +73,12 @@ class NmnistReader final : public EventsReader {
 
   bool read(std::vector<Event>& events) override {
     const std::uint64_t start = file_.offset();
-    const auto bytes = file_.read(kPortion * kEventBytes);
+    const auto bytes = file_.read(kPortion * kNmnistEventBytes);
     const auto* const in = reinterpret_cast<const std::uint8_t*>(bytes.data());
-    for (std::size_t i = 0; i + kEventBytes <= bytes.size(); i += kEventBytes) {
+    for (std::size_t i = 0; i + kNmnistEventBytes <= bytes.size(); i += kNmnistEventBytes) {
       if (const auto event = decoder_.decode(in + i)) events.push_back(*event);
     }
-    if (bytes.size() % kEventBytes != 0) file_.fail(start + bytes.size(), "the file ends within an event");
+    if (bytes.size() % kNmnistEventBytes != 0) file_.fail(start + bytes.size(), "the file ends within an event");
     return !bytes.empty();
   }
 
@@ -93,11 +93,11 @@ class NmnistReader final : public EventsReader {
 bool is_nmnist(const std::filesystem::path& path, std::string_view head) {
   std::error_code error;
   const std::uintmax_t size = std::filesystem::file_size(path, error);
-  if (path.extension() != ".bin" || error || size % kEventBytes != 0) return false;
+  if (path.extension() != ".bin" || error || size % kNmnistEventBytes != 0) return false;
   const auto* const in = reinterpret_cast<const std::uint8_t*>(head.data());
   Decoder decoder;
   TimeNs last = 0;
-  for (std::size_t i = 0; i + kEventBytes <= head.size(); i += kEventBytes) {
+  for (std::size_t i = 0; i + kNmnistEventBytes <= head.size(); i += kNmnistEventBytes) {
     const auto event = decoder.decode(in + i);
     if (!event) continue;
     if (event->t < last) return false;
@@ -118,7 +118,7 @@ Format nmnist_format() {
       .max_width = kMaxWidth,
       .max_height = kMaxHeight,
       .min_time = 0,
-      .max_time = kMaxUs * kNsPerUs + kNsPerUs - 1,
+      .max_time = kMaxNmnistUs * kNsPerUs + kNsPerUs - 1,
       .recognises = is_nmnist,
       .open =
           [](const auto& path, const ReadOptions& options) {

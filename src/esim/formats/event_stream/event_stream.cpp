@@ -19,12 +19,12 @@ namespace esim::inline formats {
 namespace {
 
 constexpr std::string_view kSignature = "Event Stream";
-constexpr std::size_t kVersionBytes = 3, kSizeBytes = 4, kEventBytes = 5;
+constexpr std::size_t kVersionBytes = 3, kSizeBytes = 4, kDvsEventBytes = 5;
 constexpr std::uint8_t kMajorVersion = 2;
 constexpr int kMaxExtent = 65535;  // px
 
 // Times are differences: 1 byte for each 127 us without events. With this limit, a pause adds at most 135 MB.
-constexpr std::int64_t kMaxUs = (std::int64_t{1} << 34) - 1;
+constexpr std::int64_t kMaxStreamUs = (std::int64_t{1} << 34) - 1;
 
 enum Type : std::uint8_t { kGeneric, kDvs, kAtis, kDisplay, kColor };
 
@@ -158,7 +158,7 @@ class EventStreamReader final : public EventsReader {
         ++i;
         continue;
       }
-      if (i + kEventBytes > count) break;
+      if (i + kDvsEventBytes > count) break;
       us += kType == kDvs ? head >> 1 : head >> 2;
       const int x = in[i + 1] | (in[i + 2] << 8), y = in[i + 3] | (in[i + 4] << 8);
       if (x >= sensor_.width || y >= sensor_.height) fail_place(start + i, x, y);
@@ -171,7 +171,7 @@ class EventStreamReader final : public EventsReader {
         events.push_back({us * kNsPerUs, static_cast<std::uint16_t>(x),
                           static_cast<std::uint16_t>(sensor_.height - 1 - y), static_cast<std::int8_t>(on ? 1 : -1)});
       }
-      i += kEventBytes;
+      i += kDvsEventBytes;
     }
     us_ = us;
     return i;
@@ -201,7 +201,7 @@ Format event_stream_format() {
       .max_width = kMaxExtent,
       .max_height = kMaxExtent,
       .min_time = 0,
-      .max_time = kMaxUs * kNsPerUs + kNsPerUs - 1,
+      .max_time = kMaxStreamUs * kNsPerUs + kNsPerUs - 1,
       .recognises = [](const auto&, std::string_view head) { return head.starts_with(kSignature); },
       .open =
           [](const auto& path, const ReadOptions& options) {

@@ -25,8 +25,8 @@ using jaer::Layout;
 static_assert(std::endian::native == std::endian::little, "the bytes of numbers are swapped");
 
 constexpr std::size_t kRecordBytes = 8;
-constexpr std::int64_t kMaxUs = 0xFFFF'FFFF;
-constexpr std::int64_t kTurnUs = kMaxUs + 1;
+constexpr std::int64_t kMaxAedat2Us = 0xFFFF'FFFF;
+constexpr std::int64_t kAedat2TurnUs = kMaxAedat2Us + 1;
 
 // DAVIS
 constexpr int kYShift = 22, kXShift = 12, kPolarityShift = 11;
@@ -167,7 +167,7 @@ class Aedat2Reader final : public EventsReader {
 
   /// The time in the file wraps to 0. Smaller steps back are no wraps; the check of the order handles them.
   TimeNs time_of(const Place& place) {
-    if (place.us < last_us_ && last_us_ - place.us > kTurnUs / 2) turns_us_ += kTurnUs;
+    if (place.us < last_us_ && last_us_ - place.us > kAedat2TurnUs / 2) turns_us_ += kAedat2TurnUs;
     last_us_ = place.us;
     if (turns_us_ > kMaxTurnsUs) file_.fail(place.byte, "the times from this byte on are out of range");
     return (turns_us_ + place.us) * kNsPerUs;
@@ -193,7 +193,7 @@ Format aedat2_format() {
       .max_width = jaer::kMaxDavisWidth,
       .max_height = jaer::kMaxDavisHeight,
       .min_time = 0,
-      .max_time = kMaxUs * kNsPerUs + kNsPerUs - 1,
+      .max_time = kMaxAedat2Us * kNsPerUs + kNsPerUs - 1,
       .recognises = [](const auto&, std::string_view head) { return head.starts_with(jaer::kSignature); },
       .open =
           [](const auto& path, const ReadOptions& options) {

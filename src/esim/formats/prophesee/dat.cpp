@@ -11,8 +11,8 @@ namespace esim::inline formats {
 namespace {
 
 constexpr int kMaxExtent = 1 << 14;  // px
-constexpr std::int64_t kMaxUs = 0xFFFF'FFFF;
-constexpr std::uint64_t kTurnUs = kMaxUs + 1;
+constexpr std::int64_t kMaxDatUs = 0xFFFF'FFFF;
+constexpr std::uint64_t kDatTurnUs = kMaxDatUs + 1;
 
 constexpr char kEventSize = 8;
 constexpr char kEvent2d = 0x00, kEventCd = 0x0C;  // two types with the same content
@@ -64,7 +64,7 @@ class DatReader final : public EventsReader {
     const auto words = prophesee::read_words(file_, words_, kBlockWords);
     for (const std::uint64_t word : words) {
       const auto us = static_cast<std::uint32_t>(word), place = static_cast<std::uint32_t>(word >> 32);
-      if (us < last_us_ && last_us_ - us > kTurnUs / 2) turns_us_ += kTurnUs;
+      if (us < last_us_ && last_us_ - us > kDatTurnUs / 2) turns_us_ += kDatTurnUs;
       last_us_ = us;
       portion_.put(static_cast<TimeNs>(turns_us_ + us) * kNsPerUs, place & 0x3FFF, (place >> 14) & 0x3FFF,
                    place >> 28 != 0);
@@ -98,7 +98,7 @@ Format dat_format() {
       .max_width = kMaxExtent,
       .max_height = kMaxExtent,
       .min_time = 0,
-      .max_time = kMaxUs * kNsPerUs + kNsPerUs - 1,
+      .max_time = kMaxDatUs * kNsPerUs + kNsPerUs - 1,
       .recognises = [](const auto&, std::string_view head) { return is_dat(head); },
       .open = [](const auto& path,
                  const ReadOptions& options) { return make_events_source(std::make_unique<DatReader>(path), options); },

@@ -15,7 +15,7 @@ using prophesee::WordFile;
 
 constexpr int kMaxExtent = 2048;  // px
 constexpr int kLowBits = 6, kHighBits = 28;
-constexpr std::int64_t kMaxUs = (std::int64_t{1} << (kLowBits + kHighBits)) - 1;
+constexpr std::int64_t kMaxEvt2Us = (std::int64_t{1} << (kLowBits + kHighBits)) - 1;
 constexpr std::int64_t kClockSlack = 1024;  // x 64 us
 
 enum Type : std::uint32_t { kOff = 0x0, kOn = 0x1, kTimeHigh = 0x8 };
@@ -137,7 +137,7 @@ Format evt2_format() {
       .max_width = kMaxExtent,
       .max_height = kMaxExtent,
       .min_time = 0,
-      .max_time = kMaxUs * kNsPerUs + kNsPerUs - 1,
+      .max_time = kMaxEvt2Us * kNsPerUs + kNsPerUs - 1,
       .recognises =
           [](const auto&, std::string_view head) {
             const std::string encoding = prophesee::parse_header(head).encoding;

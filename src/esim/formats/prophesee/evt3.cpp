@@ -11,7 +11,7 @@ namespace {
 using prophesee::WordFile;
 
 // The clock wraps, but files may be longer, up to the maximum time of EVT 2.0.
-constexpr std::int64_t kMaxUs = (std::int64_t{1} << 34) - 1;
+constexpr std::int64_t kMaxEvt3Us = (std::int64_t{1} << 34) - 1;
 
 class Evt3Writer final : public EventsWriter {
  public:
@@ -84,7 +84,7 @@ Format evt3_format() {
       .max_width = prophesee::evt3::kMaxExtent,
       .max_height = prophesee::evt3::kMaxExtent,
       .min_time = 0,
-      .max_time = kMaxUs * kNsPerUs + kNsPerUs - 1,
+      .max_time = kMaxEvt3Us * kNsPerUs + kNsPerUs - 1,
       .recognises = [](const auto&, std::string_view head) { return prophesee::parse_header(head).encoding == "EVT3"; },
       .open =
           [](const auto& path, const ReadOptions& options) {

@@ -46,7 +46,7 @@ struct JsonObject {
   }
 };
 
-json load(const std::filesystem::path& file) {
+json load_json(const std::filesystem::path& file) {
   json root;
   try {
     root = json::parse(text_of_reconstruction(file));
@@ -162,7 +162,7 @@ Distortion distortion_of(const Intrinsics& c) {
 }  // namespace
 
 std::vector<TransformsFrame> read_transforms_frames(const std::filesystem::path& file) {
-  const json root = load(file);
+  const json root = load_json(file);
   std::vector<TransformsFrame> frames;
   std::size_t times = 0, timestamps = 0;
   for_each_frame(root, file, [&](const JsonObject& frame) {
@@ -183,7 +183,7 @@ std::vector<TransformsFrame> read_transforms_frames(const std::filesystem::path&
 }
 
 std::vector<CalibratedCamera> read_transforms_calibration(const std::filesystem::path& file) {
-  const json root = load(file);
+  const json root = load_json(file);
   const JsonObject shared{file, "the file", root};
   std::set<Intrinsics> known;
   std::vector<CalibratedCamera> cameras;

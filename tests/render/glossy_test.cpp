@@ -145,8 +145,10 @@ TEST_P(Glossy, ReflectsSunsAndLampsByTheEquations) {
       const double expected = reflected(point);
       // Sharp highlights depend on the last digits of the point.
       double tolerance = 2e-4 * expected / std::pow(surface.roughness, 2) * 0.1 + 1e-4 * expected;
-      if (GetParam() == Engine::gl) {  // graphics cards round vertices to 1/256 of a pixel (GL_SUBPIXEL_BITS)
-        const double step = (camera.T_world_body.translation - point).norm() / kModel.fx / v.z() / 256;
+      if (GetParam() == Engine::gl) {
+        // Graphics cards round vertices to 1/256 of a pixel (GL_SUBPIXEL_BITS), which moves the points between three of
+        // them by 1/1500 rms. An NVIDIA H200 needs a tenth more than the tolerance of the other engines.
+        const double step = (camera.T_world_body.translation - point).norm() / kModel.fx / v.z() / 1024;
         for (const Vector3d& side : {Vector3d(step, 0, 0), Vector3d(0, step, 0)})
           tolerance += std::abs(reflected(point + side) - reflected(point - side)) / 2;
       }

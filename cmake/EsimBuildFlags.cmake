@@ -42,8 +42,9 @@ endif()
 if(ESIM_SANITIZE)
   add_compile_options(-fsanitize=${ESIM_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
   add_link_options(-fsanitize=${ESIM_SANITIZE})
-  # The address sanitizer finds accesses through wrong pointers. Checking each pointer, too, doubles the time to compile.
-  if(ESIM_SANITIZE MATCHES "address,undefined")
+  # The address sanitizer finds accesses through wrong pointers. Checking each pointer, too, takes half as long again to
+  # compile.
+  if(ESIM_SANITIZE MATCHES "address")
     add_compile_options(-fno-sanitize=null,vptr,object-size,pointer-overflow)
   endif()
 endif()

@@ -115,8 +115,8 @@ int main(int argc, char** argv) {
   const esim::test::TemporaryDirectory folder;
   for (const esim::Format& format : esim::all_formats()) {
     if (!esim::is_tried(format)) continue;
-    if (format.name == "dsec")
-      esim::add("dsec, uncompressed", format, {.compression = Compression::none}, folder.path());
+    if (format.name == "dsec" || format.name == "mcap-packets")
+      esim::add(format.name + ", uncompressed", format, {.compression = Compression::none}, folder.path());
     esim::add(format.name, format, {}, folder.path());
   }
   benchmark::Initialize(&argc, argv);

@@ -124,9 +124,12 @@ class Copy {
 
   void note_rounding(const EventsRecord& record) {
     if (resolution_ <= 1 || summary_.rounded_to > 0) return;
-    const bool off = std::any_of(record.events.begin(), record.events.end(),
-                                 [&](const Event& event) { return (event.t - shift_) % resolution_ != 0; });
-    if (off) summary_.rounded_to = resolution_;
+    const auto any_off = [&](auto resolution) {
+      return std::any_of(record.events.begin(), record.events.end(),
+                         [&](const Event& event) { return (event.t - shift_) % resolution != 0; });
+    };
+    using Us = std::integral_constant<TimeNs, kNsPerUs>;  // division by a constant is faster
+    if (resolution_ == kNsPerUs ? any_off(Us()) : any_off(resolution_)) summary_.rounded_to = resolution_;
   }
 
   Source& from_;

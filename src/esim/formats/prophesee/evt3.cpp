@@ -1,3 +1,7 @@
+#include <algorithm>
+#include <optional>
+
+#include "esim/files/output_file.h"
 #include "esim/formats/events_reader.h"
 #include "esim/formats/events_writer.h"
 #include "esim/formats/prophesee/evt3_words.h"
@@ -8,32 +12,43 @@
 namespace esim::inline formats {
 namespace {
 
-using prophesee::WordFile;
-
 // The clock wraps, but files may be longer, up to the maximum time of EVT 2.0.
 constexpr std::int64_t kMaxEvt3Us = (std::int64_t{1} << 34) - 1;
 
 class Evt3Writer final : public EventsWriter {
  public:
   void begin(const std::filesystem::path& path, SensorSize sensor) override {
-    encoder_.output().file.emplace(path, prophesee::raw_header("EVT3", "3.0", sensor));
+    file_.emplace(path);
+    file_->append(prophesee::raw_header("EVT3", "3.0", sensor));
   }
 
-  void write(EventSpan events) override { encoder_.write(events); }
+  void write(EventSpan events) override {
+    while (!events.empty()) {
+      const EventSpan portion = events.first(std::min(events.size(), kPortion));
+      events = events.subspan(portion.size());
+      encoder_.write(portion);
+      put_words();
+    }
+  }
 
   void end() override {
     encoder_.end();
-    encoder_.output().file->close();
-    encoder_.output().file.reset();
+    put_words();
+    file_->close();
+    file_.reset();
   }
 
  private:
-  struct PutInFile {
-    std::optional<WordFile<std::uint16_t>> file{};
-    void operator()(std::uint16_t word) { file->put(word); }
-  };
+  static constexpr std::size_t kPortion = 1 << 12;
 
-  prophesee::evt3::Encoder<PutInFile> encoder_;
+  void put_words() {
+    const auto bytes = std::as_bytes(encoder_.words());
+    file_->append({reinterpret_cast<const char*>(bytes.data()), bytes.size()});
+    encoder_.clear();
+  }
+
+  std::optional<OutputFile> file_;
+  prophesee::evt3::Encoder encoder_;
 };
 
 class Evt3Reader final : public EventsReader {

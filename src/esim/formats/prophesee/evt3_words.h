@@ -2,8 +2,10 @@
 
 #include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "esim/events/event.h"
 #include "esim/formats/prophesee/prophesee.h"
@@ -33,17 +35,19 @@ constexpr std::uint16_t word(Type type, std::uint64_t value) {
 }
 
 /// Encodes events. Consecutive events in one row, at one time, of one polarity and from left to right form a run. Dense
-/// runs are written as vectors. A function `Put` takes the words.
-template <typename Put>
+/// runs are written as vectors.
 class Encoder {
  public:
-  Put& output() { return put_; }
+  /// The words since clear(), valid until the next call. Those of the last run follow when it ends.
+  std::span<const std::uint16_t> words() const { return std::span(words_).first(count_); }
+  void clear() { count_ = 0; }
 
   /// The next words do not rely on those before, except for counting the wraps of the clock, which begins at this time.
   void begin(std::int64_t us) {
     if (known_high_ < 0) known_high_ = us >> kTimeBits;
     put_high(us >> kTimeBits);
-    put_(word(kTimeHigh, static_cast<std::uint64_t>(known_high_)));
+    *room(1) = word(kTimeHigh, static_cast<std::uint64_t>(known_high_));
+    ++count_;
     known_us_ = known_y_ = -1;
   }
 
@@ -51,8 +55,9 @@ class Encoder {
     for (const Event& event : events) {
       const std::int64_t us = event.t / kNsPerUs;
       const bool on = event.polarity > 0;
-      const bool continues = size_ > 0 && us == us_ && event.y == y_ && on == on_ && event.x > columns_[size_ - 1];
-      if (!continues) {
+      // Which of these differ is not predictable, but that one does nearly always is.
+      const bool alike = static_cast<bool>((us == us_) & (event.y == y_) & (on == on_));
+      if (!alike || size_ == 0 || event.x <= columns_[size_ - 1]) {
         end();
         us_ = us, y_ = event.y, on_ = on;
       }
@@ -60,26 +65,35 @@ class Encoder {
     }
   }
 
-  /// Writes what is left.
+  /// Ends the run.
   void end() {
     if (size_ == 0) return;
-    if (us_ != known_us_) put_time();
-    if (y_ != known_y_) put_(word(kAddressY, y_));
-    known_y_ = y_;
-    for (std::size_t i = 0; i < size_;) i = put_columns(i);
+    put_high(us_ >> kTimeBits);
+    std::uint16_t* out = room(size_ + 2);
+    *out = word(kTimeLow, static_cast<std::uint64_t>(us_));
+    out += us_ != known_us_;  // without a branch, which would not be predictable
+    *out = word(kAddressY, y_);
+    out += y_ != known_y_;
+    known_us_ = us_, known_y_ = y_;
+    for (std::size_t i = 0; i < size_;) i = put_columns(i, out);
+    count_ = static_cast<std::size_t>(out - words_.data());
     size_ = 0;
   }
 
  private:
-  /// Writes every value of the high bits, as cameras do, so that readers can count the wraps of the clock.
-  void put_high(std::int64_t high) {
-    while (known_high_ < high) put_(word(kTimeHigh, static_cast<std::uint64_t>(++known_high_)));
+  /// The next word, with room for so many.
+  std::uint16_t* room(std::size_t words) {
+    if (words_.size() - count_ < words) words_.resize(2 * count_ + words + kMaxExtent);
+    return words_.data() + count_;
   }
 
-  void put_time() {
-    put_high(us_ >> kTimeBits);
-    put_(word(kTimeLow, static_cast<std::uint64_t>(us_)));
-    known_us_ = us_;
+  /// Writes every value of the high bits, as cameras do, so that readers can count the wraps of the clock.
+  void put_high(std::int64_t high) {
+    if (known_high_ >= high) return;
+    const auto missing = static_cast<std::size_t>(high - known_high_);
+    std::uint16_t* out = room(missing);
+    while (known_high_ < high) *out++ = word(kTimeHigh, static_cast<std::uint64_t>(++known_high_));
+    count_ += missing;
   }
 
   std::size_t count_before(std::size_t first, int column) const {
@@ -88,27 +102,28 @@ class Encoder {
     return end - first;
   }
 
-  /// Writes the run from this index on; returns the index of the rest.
-  std::size_t put_columns(std::size_t first) {
+  /// Writes the run from this index on, at most one word for each event; returns the index of the rest.
+  std::size_t put_columns(std::size_t first, std::uint16_t*& out) const {
     const std::uint64_t polarity = on_ ? 0x800 : 0;
     int base = columns_[first];
     if (count_before(first, base + 12) < 3) {
-      put_(word(kAddressX, polarity | columns_[first]));
+      *out++ = word(kAddressX, polarity | columns_[first]);
       return first + 1;
     }
-    put_(word(kVectorBase, polarity | columns_[first]));
+    *out++ = word(kVectorBase, polarity | columns_[first]);
     for (std::size_t count; (count = count_before(first, base + 12)) > 0;) {
       const int length = columns_[first + count - 1] < base + 8 ? 8 : 12;
       std::uint64_t valid = 0;
       for (std::size_t i = first; i < first + count; ++i) valid |= std::uint64_t{1} << (columns_[i] - base);
-      put_(word(length == 8 ? kVector8 : kVector12, valid));
+      *out++ = word(length == 8 ? kVector8 : kVector12, valid);
       first += count;
       base += length;
     }
     return first;
   }
 
-  Put put_{};
+  std::vector<std::uint16_t> words_;  // with room for more
+  std::size_t count_ = 0;
   std::array<std::uint16_t, kMaxExtent> columns_{};  // of the run
   std::size_t size_ = 0;
   std::int64_t us_ = 0;

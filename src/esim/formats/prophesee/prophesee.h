@@ -60,7 +60,7 @@ std::span<const Word> read_words(InputFile& file, std::unique_ptr<Word[]>& words
   return {words.get(), count};
 }
 
-/// A reader of a file of equal-sized words.
+/// Writes a file of words of equal size.
 template <typename Word>
 class WordFile {
  public:

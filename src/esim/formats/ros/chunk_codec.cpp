@@ -96,18 +96,20 @@ void compress_zstd(std::string_view raw, std::string& packed) {
 
 }  // namespace
 
-void compress(ChunkCodec codec, std::string_view raw, std::string& packed) {
+std::string_view compress(ChunkCodec codec, std::string_view raw, std::string& buffer) {
   switch (codec) {
     case ChunkCodec::none:
-      packed = raw;
-      return;
+      return raw;
     case ChunkCodec::lz4:
-      return compress_lz4(raw, packed);
+      compress_lz4(raw, buffer);
+      break;
     case ChunkCodec::zstd:
-      return compress_zstd(raw, packed);
+      compress_zstd(raw, buffer);
+      break;
     case ChunkCodec::bz2:
       throw InternalError("chunks are not written with bzip2");
   }
+  return buffer;
 }
 
 std::span<const std::byte> decompress(ChunkCodec codec, std::span<const std::byte> packed, std::uint64_t size,

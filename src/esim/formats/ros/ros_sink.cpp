@@ -50,6 +50,7 @@ class RosSink final : public Sink {
   template <typename T>
   void send(std::string_view topic, MessageType type, TimeNs t, const T& message);
   void flush_events(int camera);
+  void send_events(int camera, EventSpan events);
   void send_camera_info(int camera, TimeNs t);
   void send_static_transforms();
   ImuMessage imu_message(TimeNs t, const InertialSignals& signals) const;
@@ -144,15 +145,25 @@ void RosSink::put(const EventsRecord& record) {
     const TimeNs end = (waiting.empty() ? rest.front().t : waiting.front().t) + kEventsDuration;
     const auto late = std::partition_point(rest.begin(), rest.end(), [&](const Event& event) { return event.t < end; });
     const std::size_t count = std::min(static_cast<std::size_t>(late - rest.begin()), kEventsCount - waiting.size());
-    waiting.insert(waiting.end(), rest.begin(), rest.begin() + static_cast<std::ptrdiff_t>(count));
+    const EventSpan next = rest.first(count);
     rest = rest.subspan(count);
-    if (!rest.empty() || waiting.size() == kEventsCount || at_once_) flush_events(record.camera);
+    const bool ends = !rest.empty() || waiting.size() + count == kEventsCount || at_once_;
+    if (ends && waiting.empty()) {
+      send_events(record.camera, next);
+      continue;
+    }
+    waiting.insert(waiting.end(), next.begin(), next.end());
+    if (ends) flush_events(record.camera);
   }
 }
 
 void RosSink::flush_events(int camera) {
-  std::vector<Event>& events = events_[static_cast<std::size_t>(camera)];
-  if (events.empty()) return;
+  std::vector<Event>& waiting = events_[static_cast<std::size_t>(camera)];
+  if (!waiting.empty()) send_events(camera, waiting);
+  waiting.clear();
+}
+
+void RosSink::send_events(int camera, EventSpan events) {
   const TimeNs t = events.back().t;
   const Camera& model = camera_of(camera).model;
   const auto height = static_cast<std::uint32_t>(model.height), width = static_cast<std::uint32_t>(model.width);
@@ -174,7 +185,6 @@ void RosSink::flush_events(int camera) {
     write_events(writer, events);
     output_->write(topic_of(camera, topic::kEvents), MessageType::events, t, payload_);
   }
-  events.clear();
 }
 
 void RosSink::put(const FrameRecord& record) {

@@ -12,9 +12,13 @@ namespace {
 
 constexpr std::size_t kChunkBytes = 1U << 20;
 
-std::uint32_t crc_of(std::string_view bytes, std::uint32_t before = 0) {
-  return static_cast<std::uint32_t>(
-      crc32_z(before, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
+std::uint32_t crc_of(std::string_view bytes) {
+  return static_cast<std::uint32_t>(crc32_z(0, reinterpret_cast<const unsigned char*>(bytes.data()), bytes.size()));
+}
+
+/// Of bytes with the checksum `before`, followed by `size` bytes with the checksum `after`.
+std::uint32_t joined_crc(std::uint32_t before, std::uint32_t after, std::size_t size) {
+  return static_cast<std::uint32_t>(crc32_combine(before, after, static_cast<z_off_t>(size)));
 }
 
 std::string_view name_of(ros::ChunkCodec codec) {
@@ -30,10 +34,12 @@ McapOutput::McapOutput(std::filesystem::path path, ros::ChunkCodec codec) : file
   append(start);
 }
 
-void McapOutput::append(std::string_view bytes) {
+void McapOutput::append(std::string_view bytes) { append(bytes, crc_of(bytes)); }
+
+void McapOutput::append(std::string_view bytes, std::uint32_t crc) {
   file_.append(bytes);
   position_ += bytes.size();
-  data_crc_ = crc_of(bytes, data_crc_);
+  data_crc_ = joined_crc(data_crc_, crc, bytes.size());
 }
 
 McapOutput::Channel& McapOutput::channel(const std::string& topic, ros::MessageType type) {
@@ -82,20 +88,21 @@ void McapOutput::write(const std::string& topic, ros::MessageType type, TimeNs t
 
 void McapOutput::flush_chunk() {
   if (chunk_.empty()) return;
-  ros::compress(codec_, chunk_, packed_);
+  const std::string_view packed = ros::compress(codec_, chunk_, packed_);
   ChunkIndex& index = chunks_.emplace_back(ChunkIndex{chunk_start_, chunk_end_, position_});
-  index.packed_size = packed_.size(), index.size = chunk_.size();
+  index.packed_size = packed.size(), index.size = chunk_.size();
+  const std::uint32_t crc = crc_of(chunk_);
   record_.clear();
-  RecordWriter(record_, Op::chunk)
+  RecordWriter(record_, Op::chunk, packed.size())
       .number(chunk_start_)
       .number(chunk_end_)
       .number(index.size)
-      .number(crc_of(chunk_))
+      .number(crc)
       .text(name_of(codec_))
-      .number(index.packed_size)
-      .bytes(packed_);
+      .number(index.packed_size);
   append(record_);
-  index.length = record_.size();
+  append(packed, codec_ == ros::ChunkCodec::none ? crc : crc_of(packed));
+  index.length = record_.size() + packed.size();
 
   for (auto& [topic, channel] : channels_) {
     if (channel.messages.empty()) continue;
@@ -175,7 +182,7 @@ std::string McapOutput::summary() const {
   RecordWriter(footer, Op::footer).number(position_).number(offsets_position).number(std::uint32_t{0});
   // The checksum covers the footer before the checksum.
   footer.resize(footer.size() - sizeof(std::uint32_t));
-  ros::append_number(footer, crc_of(footer, crc_of(summary)));
+  ros::append_number(footer, crc_of(summary + footer));
   return summary + footer;
 }
 

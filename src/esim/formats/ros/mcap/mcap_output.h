@@ -39,6 +39,7 @@ class McapOutput final : public ros::MessageOutput {
   Channel& channel(const std::string& topic, ros::MessageType type);
   void flush_chunk();
   void append(std::string_view bytes);
+  void append(std::string_view bytes, std::uint32_t crc);
   std::string summary() const;
 
   OutputFile file_;

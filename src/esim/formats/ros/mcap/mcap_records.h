@@ -30,15 +30,16 @@ enum class Op : std::uint8_t {
 inline constexpr std::size_t kRecordHeadBytes = 9;
 inline constexpr std::size_t kFooterBytes = kRecordHeadBytes + 20;
 
-/// Appends a record to `out`; its content ends when this object is destroyed.
+/// Appends a record to `out`; its content ends when this object is destroyed, but for the `rest`: so many bytes, which
+/// the caller writes behind it.
 class RecordWriter {
  public:
-  RecordWriter(std::string& out, Op op) : out_(out) {
+  RecordWriter(std::string& out, Op op, std::uint64_t rest = 0) : out_(out), rest_(rest) {
     ros::append_number(out_, op);
     ros::append_number(out_, std::uint64_t{0});
     start_ = out_.size();
   }
-  ~RecordWriter() { ros::store(out_.data() + start_ - sizeof(std::uint64_t), std::uint64_t{out_.size() - start_}); }
+  ~RecordWriter() { ros::store(out_.data() + start_ - sizeof(std::uint64_t), out_.size() - start_ + rest_); }
   RecordWriter(const RecordWriter&) = delete;
   RecordWriter& operator=(const RecordWriter&) = delete;
 
@@ -58,6 +59,7 @@ class RecordWriter {
 
  private:
   std::string& out_;
+  std::uint64_t rest_;
   std::size_t start_ = 0;
 };
 

@@ -131,13 +131,13 @@ void EventPacketEncoder::encode(EventSpan events, EventPacketMessage& packet) {
   const TimeNs first = events.front().t;
   if (encoding_ == PacketEncoding::evt3) {
     // Programs that receive only later packets, too, can decode each of them.
-    evt3_.output().words.clear();
+    evt3_.clear();
     evt3_.begin(first / kNsPerUs);
     evt3_.write(events);
     evt3_.end();
     packet.encoding = "evt3";
     packet.header.stamp = first / kNsPerUs * kNsPerUs;
-    packet.events = std::as_bytes(std::span(evt3_.output().words));
+    packet.events = std::as_bytes(evt3_.words());
   } else {
     mono_.clear();
     for (const Event& event : events) {

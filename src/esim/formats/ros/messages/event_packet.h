@@ -67,14 +67,9 @@ class EventPacketEncoder {
   void encode(EventSpan events, EventPacketMessage& packet);
 
  private:
-  struct PutInWords {
-    std::vector<std::uint16_t> words{};
-    void operator()(std::uint16_t word) { words.push_back(word); }
-  };
-
   PacketEncoding encoding_;
   std::uint64_t count_ = 0;
-  prophesee::evt3::Encoder<PutInWords> evt3_;
+  prophesee::evt3::Encoder evt3_;
   std::string mono_;
 };
 

@@ -67,14 +67,14 @@ void RosbagOutput::write(const std::string& topic, ros::MessageType type, TimeNs
 void RosbagOutput::flush_chunk() {
   if (chunk_.empty()) return;
   ChunkInfo& info = chunks_.emplace_back(ChunkInfo{position_, chunk_start_, chunk_end_});
-  ros::compress(codec_, chunk_, packed_);
+  const std::string_view packed = ros::compress(codec_, chunk_, packed_);
   record_.clear();
   RecordWriter(record_, Op::chunk)
       .text("compression", codec_ == ros::ChunkCodec::none ? "none" : "lz4")
       .field("size", static_cast<std::uint32_t>(chunk_.size()))
-      .end_header(packed_.size());
+      .end_header(packed.size());
   append(record_);
-  append(packed_);
+  append(packed);
 
   for (auto& [topic, connection] : connections_) {
     if (connection.messages.empty()) continue;

@@ -3,7 +3,9 @@
 
 #include <cmath>
 #include <cstring>
+#include <map>
 #include <random>
+#include <set>
 
 #include "esim/core/error.h"
 #include "esim/files/input_file.h"
@@ -279,9 +281,17 @@ TEST_P(ImageSequences, CutAndDamagedFilesAreNamedOrHarmless) {
     } catch (const UserError&) {  // the file could not be read
     }
   };
+  std::map<std::pair<fs::path, fs::path>, std::pair<fs::path, fs::path>> kinds;  // by folder and extension: two files
   for (const auto& entry : fs::recursive_directory_iterator(path)) {
     if (!entry.is_regular_file()) continue;
-    const std::string name = fs::relative(entry.path(), base_.path()).string(), sound = test::content(entry.path());
+    const fs::path& file = entry.path();
+    auto& [first, last] = kinds.try_emplace({file.parent_path(), file.extension()}, file, file).first->second;
+    first = std::min(first, file), last = std::max(last, file);
+  }
+  std::set<fs::path> files;
+  for (const auto& [kind, ends] : kinds) files.insert({ends.first, ends.second});
+  for (const fs::path& file : files) {
+    const std::string name = fs::relative(file, base_.path()).string(), sound = test::content(file);
     const std::size_t step = std::max<std::size_t>(1, sound.size() / 40);
     for (std::size_t size = 0; size < sound.size(); size += step) {
       base_.write(name, sound.substr(0, size));

@@ -55,7 +55,7 @@ void at_any_write(const Work& work, const Look& look) {
   bool readable = false;
   constexpr int kMax = 5000;
   for (int number = 1; number < kMax;
-       number += number < 80 ? 1 : 11) {  // later, only some writes of each of the many flushes
+       number += number < 80 ? 1 : 31) {  // later, only some writes of each of the many flushes
     const auto killed = killed_at_write(number, work);
     if (!killed) GTEST_SKIP() << "processes cannot be traced here";
     std::uint64_t found = 0;

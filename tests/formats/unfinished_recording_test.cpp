@@ -300,7 +300,7 @@ TEST(FullDisk, LeavesTheBeginningOfTheEvents) {
     }
     const auto bytes = fs::file_size(whole);
     std::uint64_t max = 0;
-    for (std::uintmax_t limit = 4096; limit < bytes; limit += bytes / 97) {
+    for (std::uintmax_t limit = 4096; limit < bytes; limit += bytes / 31) {
       const fs::path cut = base.path() / "cut.h5";
       {
         EventsHdf5Writer writer(cut, 0, {TimeUnit::ns, compression});

@@ -132,7 +132,7 @@ def main():
     parser.add_argument("--seconds", type=float, default=0.3)
     parser.add_argument("--rate", type=float, default=100, help="frames per second")
     parser.add_argument("--truth-rate", type=float, default=2000, help="frames per second of the truth")
-    parser.add_argument("--supersampling", type=int, nargs="*", default=[1, 2, 4])
+    parser.add_argument("--supersampling", type=int, nargs="*", default=[1, 2, 4, 8])
     parser.add_argument("--lambda-px", type=float, help="largest motion between two images that a sensor makes (default: that of esim.Sensor)")
     parser.add_argument("scenes", nargs="*", default=SCENES)
     args = parser.parse_args()
@@ -140,7 +140,7 @@ def main():
     for scene in args.scenes:
         for scale in args.supersampling:
             truth, methods = methods_of(scene, args, scale)
-            if scale > 1:
+            if 1 < scale <= 4:  # keyframes have at most 4 x 4 pixels
                 options = {"type": "keyframes", "supersampling": scale, "min_rate_hz": args.rate, "max_rate_hz": 2 * args.rate}
                 methods["keyframes"] = events_of(simulation(scene, args.seconds, sampling=options))
             for name, events in methods.items():

@@ -1,4 +1,4 @@
-// How often the intervals of fitted parameters contain the truth.
+// Whether the intervals of fitted parameters contain the truth as often as they say.
 #include <gtest/gtest.h>
 
 #include <cmath>
@@ -76,6 +76,21 @@ TEST(Fit, IntervalsFromNoiseContainTheTruth) {
                     for (const Estimate& e : test::fit_noise(truth, test::record_noise(truth, 1000000 + i)).estimates)
                       add(e, truth);
                   });
+}
+
+TEST(Fit, LampsOfAlmostOneLightLevelGiveNothingWrong) {
+  const EventCameraOptions truth = test::random_circuit(1, test::kLampNoise);
+  std::vector<PixelCounts> recordings;
+  constexpr int kSide = 24;  // px
+  for (const double lux : {100.0, 102.0}) {
+    for (const double hz : {50.0, 300.0})
+      recordings.push_back(simulate_counts(truth, {lux, hz, 0.6}, 16, 16, kSide, 1));
+  }
+  const CircuitFit found = test::fit_lamps(truth, recordings);
+  for (const Estimate& e : found.estimates) {
+    if (!e.name.starts_with("circuit.") || !e.determined()) continue;
+    EXPECT_LT(std::abs(std::log(e.value / test::true_value(truth, e.name))), std::log(e.high / e.low)) << e.name;
+  }
 }
 
 }  // namespace

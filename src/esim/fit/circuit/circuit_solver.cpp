@@ -30,6 +30,8 @@ constexpr double kLongestStep = 0.4;
 constexpr std::array<double, CircuitModel::kParameters> kRangeOfLamps{0.08, 0.08, 0.2, 0.2, 0.25, 0.25},
     kRangeOfNoise{0.1, 0.1, 0.3, 0.3, 0.3, 0.4};
 constexpr double kNarrowest = 0.5;
+// The mean fourth power of a normal distribution, since the differences from the tangent are squares of the distance.
+constexpr double kFourthMoment = 3;
 // Standard deviations of the points by which slopes are found: within which they hold, and the longest step.
 constexpr double kNear = 2, kFar = 4;
 // The search ends without a solution if the sum of squares is that large, per number, and does not decrease so much.
@@ -62,7 +64,7 @@ VectorXd cut(const VectorXd& step) { return step.cwiseMax(-kLongestStep).cwiseMi
 /// How the numbers of events depend on the parameters around a point, by simulations with the same random numbers.
 struct CircuitSolver::Slopes {
   MatrixXd slopes;  // numbers x parameters
-  MatrixXd beside;  // numbers x points: differences from the tangent
+  MatrixXd bends;  // numbers x axes of the points: differences from the tangent at one standard deviation of the points
 };
 
 /// The numbers of events as linear functions of the parameters near a point.
@@ -225,15 +227,15 @@ CircuitSolution CircuitSolver::refine(const Candidate& from) {
 /// From two estimates of the slopes.
 void CircuitSolver::set_tangent(Tangent& t, const Slopes& a, const Slopes& b, const MatrixXd& simulated) const {
   t.slopes = 0.5 * (a.slopes + b.slopes);
-  // The product of both has no contribution of random errors. n of the 2 n + 1 values do not determine the tangent.
-  const auto n = static_cast<double>(t.at.size());
-  VectorXd curvature = (a.beside.cwiseProduct(b.beside).rowwise().sum() / n).cwiseMax(0);
-  for (Index k = 0; k < curvature.size(); ++k) {
-    if (!model_.of_lamp(k)) curvature[k] = 0;
+  // The product of both has no contribution of random errors.
+  MatrixXd bends = a.bends.cwiseProduct(b.bends).cwiseMax(0);
+  for (Index k = 0; k < bends.rows(); ++k) {
+    if (!model_.of_lamp(k)) bends.row(k).setZero();
   }
+  VectorXd variances = VectorXd::Ones(bends.cols());  // of the parameters along these axes
   const auto find_inverse = [&] {
     MatrixXd covariance = target_.recorded.covariance + simulated;
-    t.other_variance = model_variance() + curvature;
+    t.other_variance = model_variance() + kFourthMoment * bends * variances.cwiseAbs2();
     covariance.diagonal() += t.other_variance;
     t.weights = covariance.inverse();
     // The random errors of one estimate would add to its square, as if the numbers told more.
@@ -242,8 +244,9 @@ void CircuitSolver::set_tangent(Tangent& t, const Slopes& a, const Slopes& b, co
     t.inverse = t.precision.inverse();
   };
   find_inverse();
-  // The differences from the tangent are squares of the distance.
-  curvature *= std::pow(std::min(1.0, largest_ratio(t.inverse, t.spread)), 2);
+  // Of parameters that are known better than the distance of the points, which is 1 along their axes.
+  const MatrixXd from_axes = t.spread.llt().matrixL(), to_axes = from_axes.inverse();
+  variances = (to_axes * t.inverse * to_axes.transpose()).diagonal().cwiseMin(1);
   find_inverse();
 }
 
@@ -289,11 +292,9 @@ CircuitSolver::Slopes CircuitSolver::find_slopes(const VectorXd& at, const Matri
   Slopes result;
   // along = slopes axes
   result.slopes = axes.transpose().triangularView<Eigen::Upper>().solve(along.transpose()).transpose();
-  result.beside = values.colwise() - values.rowwise().mean();
-  for (Index k = 0; k < n; ++k) {
-    result.beside.col(2 * k + 1) += reach * along.col(k);
-    result.beside.col(2 * k + 2) -= reach * along.col(k);
-  }
+  result.bends.resize(values.rows(), n);
+  for (Index k = 0; k < n; ++k)
+    result.bends.col(k) = (0.5 * (values.col(2 * k + 2) + values.col(2 * k + 1)) - values.col(0)) / (reach * reach);
   return result;
 }
 

@@ -235,8 +235,8 @@ const auto kLenses = testing::Range(0, 4);
 
 INSTANTIATE_TEST_SUITE_P(OfSpace, EveryRenderer, testing::Combine(testing::ValuesIn(test::kRenderersOfSpace), kLenses),
                          EveryRenderer::name);
-// Software takes seconds for each of them, and gl_splats_test.cpp compares all lenses with the processor.
-const auto kGlSplats = testing::Combine(testing::Values("moving_splats_gl"), testing::Values(0, 3));
+// One lens: software takes seconds for each test, and gl_splats_test.cpp compares all lenses with the processor.
+const auto kGlSplats = testing::Combine(testing::Values("moving_splats_gl"), testing::Values(3));
 INSTANTIATE_TEST_SUITE_P(OpenGLSplats, EveryRenderer, kGlSplats, EveryRenderer::name);
 INSTANTIATE_TEST_SUITE_P(OpenGLSplats, EveryRendererOfSpace, kGlSplats, EveryRenderer::name);
 INSTANTIATE_TEST_SUITE_P(OnSensor, EveryRenderer,

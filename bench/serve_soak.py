@@ -10,7 +10,6 @@ library alone.
 import argparse
 import json
 import pathlib
-import signal
 import subprocess
 import sys
 import tempfile
@@ -82,7 +81,7 @@ def main():
                 print(f"{passed:6.0f} s  {kib[-1]} KiB  read {reader.bytes / 1e9:.2f} GB  {reader.state}", flush=True)
                 time.sleep(min(30, seconds / 20))
         finally:
-            process.send_signal(signal.SIGINT)
+            process.terminate()
             process.wait(20)
     growth = kib[-1] / kib[len(kib) // 10] - 1
     print(f"growth {growth:.2%}")

@@ -244,7 +244,7 @@ void CircuitSolver::set_tangent(Tangent& t, const Slopes& a, const Slopes& b, co
     t.inverse = t.precision.inverse();
   };
   find_inverse();
-  // Of parameters that are known better than the distance of the points, which is 1 along their axes.
+  // Along their axes, the points have the variance 1. Where parameters are known better, the tangent holds better.
   const MatrixXd from_axes = t.spread.llt().matrixL(), to_axes = from_axes.inverse();
   variances = (to_axes * t.inverse * to_axes.transpose()).diagonal().cwiseMin(1);
   find_inverse();

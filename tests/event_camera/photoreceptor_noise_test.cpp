@@ -6,6 +6,9 @@
 
 #include <array>
 #include <cmath>
+#include <functional>
+#include <future>
+#include <vector>
 
 #include "esim/core/error.h"
 
@@ -52,6 +55,23 @@ const double kTolerance = 4 * std::sqrt(2.0 / kPixels);
 double expected_covariance(const PhotoreceptorNoise& noise, double lag) {
   const double t1 = noise.t1_ns(0), t2 = noise.t2_ns();
   return t1 / (t1 + t2) * (t1 * std::exp(-lag / t1) - t2 * std::exp(-lag / t2)) / (t1 - t2);
+}
+
+TEST(PhotoreceptorNoise, ThreadsFindTheSamePoles) {
+  const auto make = [] {
+    return PhotoreceptorNoise(1.0, 1.5 * kMs, 1 * kMs, 3 * kMs, AddressedRandom(1, Purpose::test));
+  };
+  const PhotoreceptorNoise shared = make();
+  const std::int32_t last = shared.pole_of(std::log(3 * kMs));
+  const auto steps = [last](const PhotoreceptorNoise& noise) {
+    std::vector<double> found;
+    for (std::int32_t pole = 0; pole <= last; ++pole) found.push_back(noise.step_ns(pole));
+    return found;
+  };
+  std::vector<std::future<std::vector<double>>> all;
+  for (int i = 0; i < 4; ++i) all.push_back(std::async(std::launch::async, steps, std::cref(shared)));
+  const std::vector<double> expected = steps(make());
+  for (auto& found : all) EXPECT_EQ(found.get(), expected);
 }
 
 TEST(PhotoreceptorNoise, StepsKeepTheVarianceAndTheMemoryOfTheCircuit) {

@@ -129,28 +129,35 @@ PhotoreceptorNoise::PhotoreceptorNoise(double variance, double t2_ns, double t1_
                     "be above 0, in this order",
                     variance, t2_ns, t1_min_ns, t1_max_ns));
   const auto count = static_cast<std::size_t>(std::ceil((std::log(t1_max_ns) - log_first_) * per_log_step_)) + 1;
+  poles_ = std::make_shared<Poles>();
+  poles_->all = std::vector<Pole>(count);
   for (std::size_t i = 0; i < count; ++i) {
-    Pole pole;
+    Pole& pole = poles_->all[i];
     pole.t1 = apart(std::exp(log_first_ + static_cast<double>(i) / per_log_step_), t2_);
     pole.deviation = std::sqrt(variance_ * pole.t1 / (pole.t1 + t2_));
     deviations_.push_back(pole.deviation);
-    double shortest = 0.1 * std::min(pole.t1, t2_), longest = 4 * std::max(pole.t1, t2_);
-    const auto deviation_within = [&](double h) { return static_cast<double>(make_bridge(pole.t1, h).deviation); };
-    for (int k = 0; k < 30; ++k) {
-      const double h = std::sqrt(shortest * longest);
-      (deviation_within(h) <= kUnknown * pole.deviation ? shortest : longest) = h;
-    }
-    while (deviation_within(shortest / kParts) > kNeglected * pole.deviation) shortest *= 0.9;
-    pole.step = shortest;
-    double length = pole.step;
-    for (Bridge& bridge : bridges_.emplace_back()) bridge = make_bridge(pole.t1, length), length *= 0.5;
-    pole.along = static_cast<float>(std::min(pole.step / 3, t2_) / t2_);
-    pole.margin = kBoundDeviations * bridges_.back()[0].deviation;
-    poles_.push_back(pole);
-    steps_.push_back(make_step(pole));
   }
   deviations_.push_back(deviations_.back());
   last_place_ = static_cast<double>(count - 1);
+}
+
+void PhotoreceptorNoise::find_steps(Pole& pole) const {
+  const std::scoped_lock lock(poles_->finding);
+  if (pole.found) return;
+  double shortest = 0.1 * std::min(pole.t1, t2_), longest = 4 * std::max(pole.t1, t2_);
+  const auto deviation_within = [&](double h) { return static_cast<double>(make_bridge(pole.t1, h).deviation); };
+  for (int k = 0; k < 30; ++k) {
+    const double h = std::sqrt(shortest * longest);
+    (deviation_within(h) <= kUnknown * pole.deviation ? shortest : longest) = h;
+  }
+  while (deviation_within(shortest / kParts) > kNeglected * pole.deviation) shortest *= 0.9;
+  pole.step_ns = shortest;
+  double length = pole.step_ns;
+  for (Bridge& bridge : pole.bridges) bridge = make_bridge(pole.t1, length), length *= 0.5;
+  pole.along = static_cast<float>(std::min(pole.step_ns / 3, t2_) / t2_);
+  pole.margin = kBoundDeviations * pole.bridges[0].deviation;
+  pole.step = make_step(pole);
+  pole.found.store(true, std::memory_order_release);
 }
 
 PhotoreceptorNoise::Step PhotoreceptorNoise::make_step(const Pole& pole) const {
@@ -159,7 +166,7 @@ PhotoreceptorNoise::Step PhotoreceptorNoise::make_step(const Pole& pole) const {
   std::array<std::array<double, Step::kFactors>, 3> factors{};
   for (const int k : {-1, 0, 1}) {
     const double t1 = apart(pole.t1 * std::exp(k * apart_by), t2_);
-    const NoiseMatrix moved = drift(t1, t2_, pole.step), drawn = root(added(variance_, t1, t2_, pole.step));
+    const NoiseMatrix moved = drift(t1, t2_, pole.step_ns), drawn = root(added(variance_, t1, t2_, pole.step_ns));
     factors[static_cast<std::size_t>(k + 1)] = {moved.yy, moved.xy, drawn.yy, drawn.xy, drawn.xx};
   }
   Step step;
@@ -168,7 +175,7 @@ PhotoreceptorNoise::Step PhotoreceptorNoise::make_step(const Pole& pole) const {
     step.parabolas[i] = {static_cast<float>(middle), static_cast<float>((high - low) / (2 * apart_by)),
                          static_cast<float>((high + low - 2 * middle) / (2 * apart_by * apart_by))};
   }
-  step.xx = static_cast<float>(std::exp(-pole.step / t2_));
+  step.xx = static_cast<float>(std::exp(-pole.step_ns / t2_));
   return step;
 }
 
@@ -205,7 +212,7 @@ PhotoreceptorNoise::Path PhotoreceptorNoise::path(const NoiseState& from, const 
   path.y[kParts] = to.y, path.x[kParts] = to.x;
   std::size_t draw = 1;
   std::size_t length = kParts;
-  for (const Bridge& bridge : bridges_[static_cast<std::size_t>(pole)]) {
+  for (const Bridge& bridge : used(pole).bridges) {
     for (std::size_t i = 0; i < kParts; i += length, ++draw) {
       const auto sum = [&](const std::array<float, 6>& row) {
         return (row[0] * path.y[i] + row[1] * path.x[i]) + (row[2] * path.y[i + length] + row[3] * path.x[i + length]) +
@@ -220,7 +227,7 @@ PhotoreceptorNoise::Path PhotoreceptorNoise::path(const NoiseState& from, const 
 
 NoiseState PhotoreceptorNoise::first(std::uint32_t pixel, std::int32_t pole) const {
   // Stationary: Var y = v, Var x = Cov xy = v t1 / (t1 + t2). Draw 0 belongs to this state alone.
-  const double t1 = poles_[static_cast<std::size_t>(pole)].t1, common = variance_ * t1 / (t1 + t2_);
+  const double t1 = t1_ns(pole), common = variance_ * t1 / (t1 + t2_);
   const auto n = random_.normals(pixel, 0);
   return root({variance_, common, common}).apply(n[0], n[1]);
 }
@@ -261,7 +268,7 @@ void PhotoreceptorNoise::draw(std::size_t count, const std::uint32_t* pixels, co
 NoiseState PhotoreceptorNoise::after_gap(const NoiseState& from, const std::array<float, 2>& n, double gap,
                                          std::int32_t pole) const {
   // The closed form of added(), which is exact enough except for gaps far below the time constants.
-  const double t1 = poles_[static_cast<std::size_t>(pole)].t1, h = std::max(gap, 1e-3 * std::min(t1, t2_));
+  const double t1 = t1_ns(pole), h = std::max(gap, 1e-3 * std::min(t1, t2_));
   const double e1 = std::exp(-h / t1), e2 = std::exp(-h / t2_), gain = t1 / (t1 - t2_), power = 2 * variance_ / t1;
   const double yy = variance_ * (1 - e1 * e1), uu = gain * gain * power * t2_ / 2 * (1 - e2 * e2);
   const double cross = -gain * power * t1 * t2_ / (t1 + t2_) * (1 - e1 * e2);

@@ -2,8 +2,11 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <cmath>
 #include <cstdint>
+#include <memory>
+#include <mutex>
 #include <optional>
 #include <utility>
 #include <vector>
@@ -49,21 +52,22 @@ struct NoiseCubic {
 class PhotoreceptorNoise {
  public:
   /// `variance` is q / Q, `t2_ns` the time constant of the second pole, [t1_min_ns, t1_max_ns] those of the first one
-  /// in the brightest and in the darkest light. First poles are rounded to steps of 1 %.
+  /// in the brightest and in the darkest light. First poles are rounded to steps of 1 %; the steps of each are found
+  /// when it is first used.
   PhotoreceptorNoise(double variance, double t2_ns, double t1_min_ns, double t1_max_ns, const AddressedRandom& random);
 
   /// The number of the first pole: it chooses the length of steps.
   std::int32_t pole_of(double log_t1_ns) const {
     const double place = (log_t1_ns - log_first_) * per_log_step_ + 0.5;
-    return static_cast<std::int32_t>(std::clamp(place, 0.0, static_cast<double>(poles_.size()) - 0.5));
+    return static_cast<std::int32_t>(std::clamp(place, 0.0, last_place_ + 0.5));
   }
-  double t1_ns(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].t1; }
+  double t1_ns(std::int32_t pole) const { return any(pole).t1; }
   double t2_ns() const { return t2_; }
-  double step_ns(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].step; }
+  double step_ns(std::int32_t pole) const { return used(pole).step_ns; }
 
   double variance() const { return variance_; }  ///< of y
   /// Standard deviation of x in steady light.
-  double deviation(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].deviation; }
+  double deviation(std::int32_t pole) const { return any(pole).deviation; }
   /// The same for any t1: linear in ln(t1) between the poles; and its slope.
   struct Deviation {
     double value = 0, slope = 0;
@@ -85,7 +89,7 @@ class PhotoreceptorNoise {
     float xx = 0;
   };
   static constexpr double kMaxDrift = 0.2;
-  const Step& step(std::int32_t pole) const { return steps_[static_cast<std::size_t>(pole)]; }
+  const Step& step(std::int32_t pole) const { return used(pole).step; }
 
   /// The draws of the nodes first and first + 1 of `count` pixels, up to kDrawn; `first` is even.
   /// n[k][j][i] is n_(j+1) of node first[i] + k of pixel pixels[i].
@@ -130,8 +134,8 @@ class PhotoreceptorNoise {
         std::minmax({from.x, to.x, from.x + (from.y - from.x) * reach, to.x - (to.y - to.x) * reach});
     return {static_cast<double>(low - margin(pole)), static_cast<double>(high + margin(pole))};
   }
-  float along(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].along; }
-  float margin(std::int32_t pole) const { return poles_[static_cast<std::size_t>(pole)].margin; }
+  float along(std::int32_t pole) const { return used(pole).along; }
+  float margin(std::int32_t pole) const { return used(pole).margin; }
 
  private:
   static constexpr float kBoundDeviations = 4.5F;
@@ -145,19 +149,33 @@ class PhotoreceptorNoise {
     float deviation = 0;  // of x in the middle
   };
   struct Pole {
-    double t1 = 0, deviation = 0, step = 0;
+    double t1 = 0, deviation = 0;
+    // Found when it is first used:
+    std::atomic<bool> found = false;
+    double step_ns = 0;
     float along = 0, margin = 0;
+    std::array<Bridge, kHalvings> bridges{};  // of the step, of its halves, ...
+    Step step{};
+  };
+  struct Poles {
+    std::vector<Pole> all;
+    std::mutex finding;
   };
 
+  const Pole& any(std::int32_t pole) const { return poles_->all[static_cast<std::size_t>(pole)]; }
+  const Pole& used(std::int32_t pole) const {
+    Pole& used = poles_->all[static_cast<std::size_t>(pole)];
+    if (!used.found.load(std::memory_order_acquire)) find_steps(used);
+    return used;
+  }
+  void find_steps(Pole& pole) const;
   Bridge make_bridge(double t1, double h) const;
   Step make_step(const Pole& pole) const;
 
   double variance_, t2_, log_first_, per_log_step_, last_place_ = 0;
   AddressedRandom random_;
-  std::vector<Pole> poles_;
-  std::vector<std::array<Bridge, kHalvings>> bridges_;  // of poles: of the step, of its halves, ...
-  std::vector<double> deviations_;                      // of the poles, and of one more
-  std::vector<Step> steps_;
+  std::shared_ptr<Poles> poles_;
+  std::vector<double> deviations_;  // of the poles, and of one more
 };
 
 }  // namespace esim::inline event_camera

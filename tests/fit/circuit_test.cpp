@@ -110,6 +110,11 @@ TEST(FitCircuit, LampsThatDetermineNothingSayWhy) {
   EXPECT_TRUE(test::contains(stated(80), "repeat 40 times per second, or less often, not 80 times"));
   EXPECT_TRUE(test::contains(stated(120), "repeat 40 times per second, or less often, not 120 times"));
 
+  // Pixels that hardly follow the lamp.
+  PixelCounts few = lamp({100, 40, 0.5}, 1);
+  few.extent *= 2;
+  EXPECT_TRUE(test::contains(reason({usual, few}, base, on), "make 0.5 events of a polarity in a period"));
+
   // More events than the readout can read.
   EventCameraOptions slow = base;
   slow.readout.rate_mev_per_s = 0.1;
@@ -118,6 +123,17 @@ TEST(FitCircuit, LampsThatDetermineNothingSayWhy) {
   slow = base;
   slow.refractory_period_us = 3000;
   EXPECT_TRUE(test::contains(reason({usual, lamp({100, 40, 0.5}, 3)}, slow, on), "refractory period of 3000 us"));
+}
+
+TEST(FitCircuit, FewPointsOfALampGiveTheNumbersOfMany) {
+  const EventCameraOptions sensor = test::random_circuit(1, test::kLampNoise);
+  const auto events = [&](int points) {
+    double sum = 0;
+    for (const PixelCounts::Pixel& p : simulate_counts(sensor, {300, 50, 0.6}, 8, 8, kSmall, 1, points).pixels.pixels())
+      sum += p.on + p.off;
+    return sum;
+  };
+  EXPECT_NEAR(events(16) / events(256), 1, 5e-3);  // the fundamental of 16 points is smaller by 1.3 %
 }
 
 TEST(FitCircuit, ApproximateNumbersAreNearThoseOfTheCircuit) {
@@ -129,8 +145,10 @@ TEST(FitCircuit, ApproximateNumbersAreNearThoseOfTheCircuit) {
     const CircuitModel model(truth, {kFollower}, recordings, recorded.mean);
     const Eigen::VectorXd found =
         model.approximate(Eigen::VectorXd::Constant(1, std::log(truth.circuit->source_follower_hz)));
-    for (Eigen::Index k = 0; k < found.size(); ++k)
+    for (Eigen::Index k = 0; k < found.size(); ++k) {
+      if (recorded.mean[k] < 1.1) continue;  // over a range of lamps, pixels make one event in each period
       EXPECT_NEAR(found[k], recorded.mean[k], 0.1 * recorded.mean[k] + 0.15) << number << ", " << k;
+    }
   }
 }
 
@@ -151,8 +169,13 @@ TEST(FitCircuit, OneLightLevelDoesNotTellTheTimeConstantsApart) {
   const CircuitFit found = test::fit_lamps(truth, recordings);
   EXPECT_TRUE(test::contains(estimate(found, "circuit.photocurrent_fa_per_lux").reason, "one light level"));
   EXPECT_TRUE(test::contains(estimate(found, "circuit.source_follower_hz").reason, "one light level"));
-  // The interval is wide: the thresholds depend on how the time constants share the latency.
-  expect_near(found, "contrast_threshold_on", truth.threshold_on(), 1.4);
+  // The thresholds depend on how the time constants share the latency: their intervals are wide, if the search ends.
+  const Estimate& on = estimate(found, "contrast_threshold_on");
+  if (on.determined()) {
+    expect_near(found, "contrast_threshold_on", truth.threshold_on(), 1.4);
+  } else {
+    EXPECT_TRUE(test::contains(on.reason, "add a lamp at another frequency and illuminance"));
+  }
 }
 
 TEST(FitCircuit, NoiseThatDeterminesNothingSaysWhy) {

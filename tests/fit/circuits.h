@@ -35,17 +35,17 @@ inline EventCameraOptions random_circuit(std::uint32_t number, std::array<double
   return on_bench(o);
 }
 
-/// Two lamps at several frequencies: the first at little light for the photodiode's pole, the second at much light for
-/// that of the source follower.
+/// A lamp at little light for the photodiode's pole, and at much light for that of the source follower.
 inline std::vector<PixelCounts> record_lamps(const EventCameraOptions& sensor, std::uint64_t seed,
                                              int side = kCircuitSide) {
+  constexpr double kSettlingPeriods = 20, kSettling_s = 0.05, kPeriods = 16;
   std::vector<PixelCounts> all;
   const auto record = [&](double lux, double hz) {
-    all.push_back(simulate_counts(sensor, {lux, hz, 0.6}, 16, 16, side, seed));
+    all.push_back(
+        simulate_counts(sensor, {lux, hz, 0.6}, std::max(kSettlingPeriods, kSettling_s * hz), kPeriods, side, seed));
   };
-  for (const double lux : {10.0, 300.0}) {
-    for (const double hz : {50.0, 300.0}) record(lux, hz);
-  }
+  for (const double hz : {25.0, 100.0, 400.0}) record(10, hz);
+  for (const double hz : {50.0, 200.0, 800.0}) record(300, hz);
   return all;
 }
 

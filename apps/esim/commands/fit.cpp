@@ -140,8 +140,8 @@ void add_fit(CLI::App& app, int& exit_code) {
   command->footer(
       "Examples:\n"
       "  esim fit --static wall.raw --moving desk.bag --base davis346 --out my_davis\n"
-      "  esim fit --flicker a.raw:50:0.6:10 --flicker b.raw:300:0.6:10 --flicker c.raw:50:0.6:300 \\\n"
-      "           --flicker d.raw:300:0.6:300 --static cap.raw:0 --static wall.raw:5 --base davis346\n"
+      "  esim fit --flicker a.raw:25:0.6:10 --flicker b.raw:100:0.6:10 --flicker c.raw:50:0.6:300 \\\n"
+      "           --flicker d.raw:200:0.6:300 --static cap.raw:0 --static wall.raw:5 --base davis346\n"
       "  esim fit --moving desk.bag --find-offset --out my_davis --force\n"
       "  esim fit --static events.txt --width 346 --height 260 --json --quiet\n"
       "  esim fit street.raw                                     refractory period and readout, from events alone\n"

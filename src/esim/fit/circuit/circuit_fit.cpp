@@ -26,8 +26,9 @@ constexpr double kWidest = 0.7;          // half a 95 % interval, in units of th
 constexpr double kUnknownDeviation = 3;  // standard deviation of the logarithm of a parameter before the fit
 constexpr double kFullReadout = 0.5;     // part of the readout's rate above which it delays and loses events
 constexpr double kBusy = 0.5;            // part of the time in the refractory period, above which it hides the circuit
-constexpr double kStrange = 4;           // standard deviations of the sum of squares
-constexpr double kImpossible = 10;       // standard deviations of the recordings
+constexpr double kFewestPerPeriod = 0.99;  // events of each polarity: pixels with fewer settle slowly
+constexpr double kStrange = 4;             // standard deviations of the sum of squares
+constexpr double kImpossible = 10;         // standard deviations of the recordings
 
 struct Parameter {
   const char* name;
@@ -39,6 +40,13 @@ constexpr std::array<Parameter, CircuitModel::kParameters> kNames{{{"contrast_th
                                                                    {"circuit.source_follower_hz", "Hz"},
                                                                    {"circuit.photodiode_charge_e", "electrons"},
                                                                    {"circuit.dark_current_fa", "fA"}}};
+
+/// ON or OFF events of a pixel in a period of a lamp, whichever are fewer, of the pixels that have events.
+double fewest_per_period(const PixelCounts& lamp) {
+  double on = 0, off = 0, pixels = 0;
+  for (const PixelCounts::Pixel& p : lamp.pixels.pixels()) on += p.on, off += p.off, pixels += p.on + p.off > 0 ? 1 : 0;
+  return pixels > 0 ? std::min(on, off) / (pixels * lamp.extent) : 0;
+}
 
 class CircuitFitter {
  public:
@@ -66,8 +74,16 @@ class CircuitFitter {
   /// Why a recording cannot be used.
   std::string problem_of(const PixelCounts& recording) const {
     if (!recording.problem.empty()) return recording.problem;
-    if (!recording.light.flickers() && base_.circuit->noise <= 0) return "the noise of the base is 0";
-    if (!recording.light.flickers() && !(recording.extent > 0)) return "the recording has no duration";
+    if (recording.light.flickers()) {
+      if (const double fewest = fewest_per_period(recording); fewest < kFewestPerPeriod)
+        return fmt::format(
+            "the pixels make {:.2g} events of a polarity in a period, so that it matters how long the lamp has "
+            "been on; at least one is necessary: reduce the frequency, or increase modulation or light",
+            fewest);
+    } else {
+      if (base_.circuit->noise <= 0) return "the noise of the base is 0";
+      if (!(recording.extent > 0)) return "the recording has no duration";
+    }
     const double limit_hz = 1e6 * base_.readout.rate_mev_per_s;
     if (limit_hz > 0 && recording.peak_hz > kFullReadout * limit_hz)
       return fmt::format(
@@ -163,6 +179,13 @@ class CircuitFitter {
     return t;
   }
 
+  /// Parameters that were excluded keep their own reason.
+  void give_up(const std::string& why) {
+    for (std::string& reason : reasons_) {
+      if (reason.empty()) reason = why;
+    }
+  }
+
   void solve() {
     CircuitTarget target = this->target();
     model_.emplace(base_, free_, used_, target.recorded.mean);
@@ -176,13 +199,13 @@ class CircuitFitter {
     const CircuitSolution& best = solutions_.front();
     const double times = std::sqrt(best.excess());
     if (times > kImpossible) {
-      return reasons_.fill(fmt::format(
+      return give_up(fmt::format(
           "no sensor of this kind was found whose numbers of events agree: they differ by {:.2g} times their errors; "
           "check frequency, modulation and illuminance of each recording",
           times));
     }
     if (!best.found) {
-      return reasons_.fill(
+      return give_up(
           "the search did not end at one sensor; add a lamp at another frequency and illuminance, or record longer");
     }
     if (best.degrees <= 0 || best.squares <= best.degrees + kStrange * std::sqrt(2 * best.degrees)) return;

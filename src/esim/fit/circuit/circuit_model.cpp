@@ -14,9 +14,10 @@ using Eigen::MatrixXd, Eigen::VectorXd;
 
 constexpr double kSoft = 0.2;  // of the thresholds: the transition of events_of_lamp() to no events
 // Of a pixel, before and while they count: ON and OFF events of a lamp, OFF events in constant light. At first, all
-// references are equally probable, which is not so later.
-constexpr double kSettlingEvents = 24, kLampEvents = 24, kSettlingNoise = 4, kNoiseEvents = 4;
-constexpr double kFewestCounted = 12, kMostCounted = 40, kLongest_s = 20;
+// references are equally probable, which is not so later: of a lamp with 1.6 ON events in a period, their number
+// decreases by 4 % after 4 periods, by 1 % after 12, and no more after 18.
+constexpr double kSettlingEvents = 64, kLampEvents = 24, kSettlingNoise = 4, kNoiseEvents = 4;
+constexpr double kFewestPeriods = 8, kMostPeriods = 40, kLongest_s = 20;
 
 void set_value(EventCameraOptions& o, CircuitModel::Index k, double value) {
   switch (k) {
@@ -116,7 +117,7 @@ std::vector<CountMoments> CircuitModel::simulate(const std::vector<VectorXd>& po
   workers.for_each(static_cast<int>(points.size() * n), [&](int task) {
     const std::size_t i = static_cast<std::size_t>(task) / n, k = static_cast<std::size_t>(task) % n;
     const EventCameraOptions o = sensor_at(points[i]);
-    counts[i][k] = used_[k].light.flickers() ? simulate_lamp(o, k, effort.lamp_side, seeds[i])
+    counts[i][k] = used_[k].light.flickers() ? simulate_lamp(o, k, effort, seeds[i])
                                              : simulate_noise(o, k, effort.noise_side, seeds[i] + k + 1);
   });
   std::vector<CountMoments> moments;
@@ -124,16 +125,16 @@ std::vector<CountMoments> CircuitModel::simulate(const std::vector<VectorXd>& po
   return moments;
 }
 
-PixelCounts CircuitModel::simulate_lamp(const EventCameraOptions& o, std::size_t recording, int side,
+PixelCounts CircuitModel::simulate_lamp(const EventCameraOptions& o, std::size_t recording, const Effort& effort,
                                         std::uint64_t seed) const {
   const KnownLight& light = used_[recording].light;
   const Eigen::Index k = first_number(recording);
   const double events = recorded_[k] + recorded_[k + 1];  // in a period
   const double response = TimeConstants(*o.circuit, light.lux).latency_s() * light.frequency_hz;
   const double settling =
-      std::clamp(std::ceil(std::max(kSettlingEvents / events, 4 * response)), kFewestCounted, kMostCounted);
-  const double extent = std::clamp(std::ceil(kLampEvents / events), kFewestCounted, kMostCounted);
-  return simulate_counts(o, light, settling, extent, side, seed);
+      std::clamp(std::ceil(std::max(kSettlingEvents / events, 4 * response)), kFewestPeriods, kMostPeriods);
+  const double extent = std::clamp(std::ceil(kLampEvents / events), kFewestPeriods, kMostPeriods);
+  return simulate_counts(o, light, settling, extent, effort.lamp_side, seed, effort.points);
 }
 
 PixelCounts CircuitModel::simulate_noise(const EventCameraOptions& o, std::size_t recording, int side,

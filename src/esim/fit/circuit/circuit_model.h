@@ -37,6 +37,7 @@ class CircuitModel {
   enum Index : std::size_t { kOn, kOff, kPhotocurrent, kFollower, kCharge, kDark, kParameters };
   struct Effort {
     int lamp_side, noise_side;  ///< of the simulated sensor, px
+    int points;                 ///< of the light of a lamp in a period
   };
 
   static double value(const EventCameraOptions& sensor, Index parameter);
@@ -65,7 +66,8 @@ class CircuitModel {
  private:
   /// The place of a recording in the moments.
   Eigen::Index first_number(std::size_t recording) const;
-  PixelCounts simulate_lamp(const EventCameraOptions& o, std::size_t recording, int side, std::uint64_t seed) const;
+  PixelCounts simulate_lamp(const EventCameraOptions& o, std::size_t recording, const Effort& effort,
+                            std::uint64_t seed) const;
   PixelCounts simulate_noise(const EventCameraOptions& o, std::size_t recording, int side, std::uint64_t seed) const;
   CountMoments join(const std::vector<PixelCounts>& recordings) const;
 

@@ -25,15 +25,22 @@ PixelCounts simulate_counts(const EventCameraOptions& sensor, const KnownLight& 
   const auto show = [&](double lux, double t_s) {
     camera.process(Image<float>(side, side, static_cast<float>(lux)), to_ns(t_s), events, workers);
   };
+  const auto flicker = [&](double first_period, double periods, int corners) {
+    // The fundamental of the polygon is sinc^2(1 / corners) of that of the light.
+    const double angle = std::numbers::pi / corners, scale = std::pow(angle / std::sin(angle), 2);
+    const auto count = static_cast<int>(std::lround(periods * corners));
+    for (int k = 1; k <= count; ++k) {
+      const double phase = static_cast<double>(k) / corners,
+                   relative = 1 + light.modulation * std::sin(2 * std::numbers::pi * phase);
+      show(light.lux * std::pow(relative, scale), (first_period + phase) / light.frequency_hz);
+    }
+  };
   show(light.lux, 0);
   if (light.flickers()) {
-    const auto before = static_cast<int>(std::lround(settling * points)),
-               all = before + static_cast<int>(std::lround(extent * points));
-    for (int k = 1; k <= all; ++k) {
-      const double phase = static_cast<double>(k) / points;
-      show(light.lux * (1 + light.modulation * std::sin(2 * std::numbers::pi * phase)), phase / light.frequency_hz);
-      if (k == before) events.clear();
-    }
+    const double first = std::ceil(settling);
+    flicker(0, first, points / 2);
+    events.clear();
+    flicker(first, extent, points);
   } else {
     if (settling > 0) show(light.lux, settling);
     events.clear();

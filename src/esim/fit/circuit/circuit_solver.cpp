@@ -8,6 +8,7 @@
 #include <optional>
 #include <utility>
 
+#include "esim/fit/circuit/circuit_simulation.h"
 #include "esim/fit/circuit/least_squares.h"
 
 namespace esim::inline fit {
@@ -21,8 +22,8 @@ constexpr double kModelError = 1e-3;  // relative error of the simulated pixel
 constexpr std::array kGrid{-3.0, -2.25, -1.5, -0.75, 0.0, 0.75, 1.5, 2.25, 3.0};
 constexpr double kSame = 0.3;  // of the logarithms: approximate minima that are one
 constexpr std::size_t kMaxCandidates = 3;
-constexpr CircuitModel::Effort kEffort{14, 16}, kLastEffort{32, 24};
-constexpr int kApproaches = 4, kMaxRounds = 10, kEvaluations = 2;
+constexpr CircuitModel::Effort kEffort{14, 16, 32}, kLastEffort{32, 24, kPointsOfPeriod};
+constexpr int kApproaches = 4, kUsualRounds = 5, kMaxRounds = 16, kEvaluations = 2;
 constexpr double kSmallStep = 0.07;  // of a logarithm, with which the approach ends
 constexpr double kLongestStep = 0.4;
 // The slopes under lamps are means over the values that are probable, but over at least a fraction, and at most all of
@@ -34,8 +35,10 @@ constexpr double kNarrowest = 0.5;
 constexpr double kFourthMoment = 3;
 // Standard deviations of the points by which slopes are found: within which they hold, and the longest step.
 constexpr double kNear = 2, kFar = 4;
-// The search ends without a solution if the sum of squares is that large, per number, and does not decrease so much.
+// The search ends without a solution if the sum of squares is that large, per number, and has not decreased so much in
+// some rounds.
 constexpr double kHopeless = 100, kGain = 0.7;
+constexpr int kPatience = 3;
 // Sums of squares by which a second solution may be worse: three standard deviations; before the slopes are known well.
 constexpr double kTolerance = 9, kRoughTolerance = 100;
 
@@ -63,7 +66,8 @@ VectorXd cut(const VectorXd& step) { return step.cwiseMax(-kLongestStep).cwiseMi
 
 /// How the numbers of events depend on the parameters around a point, by simulations with the same random numbers.
 struct CircuitSolver::Slopes {
-  MatrixXd slopes;  // numbers x parameters
+  CountMoments middle;  // at the point
+  MatrixXd slopes;      // numbers x parameters
   MatrixXd bends;  // numbers x axes of the points: differences from the tangent at one standard deviation of the points
 };
 
@@ -81,7 +85,7 @@ CircuitSolver::CircuitSolver(const CircuitModel& model, CircuitTarget target, st
     : model_(model), target_(std::move(target)), seed_(seed), progress_(std::move(progress)) {
   const double pixels = kEffort.lamp_side * kEffort.lamp_side, last = kLastEffort.lamp_side * kLastEffort.lamp_side,
                points = 1 + 2 * static_cast<double>(target_.start.size());
-  all_ = kApproaches * pixels + 4 * (points * pixels + last) + kEvaluations * last;
+  all_ = (kApproaches + kUsualRounds * points) * pixels + kEvaluations * last;
 }
 
 std::vector<CircuitSolution> CircuitSolver::solve() {
@@ -176,26 +180,27 @@ CircuitSolution CircuitSolver::refine(const Candidate& from) {
   Tangent tangent;
   tangent.at = from.at, tangent.spread = from.spread;
   std::optional<Slopes> before;
-  CountMoments here;
   CircuitSolution solution;
-  double squares = std::numeric_limits<double>::infinity();
-  for (int round = 0; round < kMaxRounds && !solution.found; ++round) {
+  double least = std::numeric_limits<double>::infinity();
+  int last_gain = 0;
+  for (int round = 0; round < kMaxRounds; ++round) {
     const Slopes now = find_slopes(tangent.at, tangent.spread);
-    here = simulate(tangent.at, kLastEffort);
+    const CountMoments& here = now.middle;
     set_tangent(tangent, before ? *before : now, now, here.covariance / kEvaluations);
     const VectorXd step = step_from(tangent, tangent.at, here.mean);
     const MatrixXd spread = limited(tangent.precision);
     const double moved = deviations(tangent.spread, step), wider = largest_ratio(spread, tangent.spread);
     solution.found = before && moved < kNear && wider < kNear * kNear;
+    if (solution.found) break;
+    const VectorXd rest = target_.recorded.mean - here.mean;
+    const double squares = rest.dot(tangent.weights * rest);
+    if (squares <= kGain * least) least = squares, last_gain = round;
+    if (squares > kHopeless * static_cast<double>(rest.size()) && round - last_gain == kPatience) break;
+    tangent.at += step * std::min(1.0, kFar / moved);
+    tangent.spread = spread;
     // Slopes that were found elsewhere do not tell the second estimate.
     before = now;
     if (moved > kNear) before.reset();
-    if (solution.found) break;
-    const VectorXd rest = target_.recorded.mean - here.mean;
-    const double last = std::exchange(squares, rest.dot(tangent.weights * rest));
-    if (squares > kHopeless * static_cast<double>(rest.size()) && squares > kGain * last) break;
-    tangent.at += step * std::min(1.0, kFar / moved);
-    tangent.spread = spread;
   }
   // The mean of steps from several simulations.
   const auto n = static_cast<double>(kEvaluations);
@@ -203,7 +208,7 @@ CircuitSolution CircuitSolver::refine(const Candidate& from) {
   VectorXd sum = VectorXd::Zero(tangent.at.size()), rest = VectorXd::Zero(recorded.size()), next = tangent.at;
   MatrixXd simulated = MatrixXd::Zero(recorded.size(), recorded.size());
   for (int i = 0; i < kEvaluations; ++i) {
-    if (i > 0 || !solution.found) here = simulate(next, kLastEffort);
+    const CountMoments here = simulate(next, kLastEffort);
     const VectorXd step = step_from(tangent, next, here.mean);
     sum += (next + step) / n, rest += (recorded - here.mean - tangent.slopes * step) / n;
     simulated += here.covariance / (n * n);
@@ -232,22 +237,18 @@ void CircuitSolver::set_tangent(Tangent& t, const Slopes& a, const Slopes& b, co
   for (Index k = 0; k < bends.rows(); ++k) {
     if (!model_.of_lamp(k)) bends.row(k).setZero();
   }
-  VectorXd variances = VectorXd::Ones(bends.cols());  // of the parameters along these axes
-  const auto find_inverse = [&] {
-    MatrixXd covariance = target_.recorded.covariance + simulated;
-    t.other_variance = model_variance() + kFourthMoment * bends * variances.cwiseAbs2();
-    covariance.diagonal() += t.other_variance;
-    t.weights = covariance.inverse();
-    // The random errors of one estimate would add to its square, as if the numbers told more.
-    t.precision = positive_part(a.slopes.transpose() * t.weights * b.slopes);
-    t.precision.diagonal() += target_.precision;
-    t.inverse = t.precision.inverse();
-  };
-  find_inverse();
+  const VectorXd beside = model_variance();
+  MatrixXd covariance = target_.recorded.covariance + simulated;
+  covariance.diagonal() += beside + kFourthMoment * bends.rowwise().sum();
+  t.weights = covariance.inverse();
+  // The random errors of one estimate would add to its square, as if the numbers told more.
+  t.precision = positive_part(a.slopes.transpose() * t.weights * b.slopes);
+  t.precision.diagonal() += target_.precision;
+  t.inverse = t.precision.inverse();
   // Along their axes, the points have the variance 1. Where parameters are known better, the tangent holds better.
   const MatrixXd from_axes = t.spread.llt().matrixL(), to_axes = from_axes.inverse();
-  variances = (to_axes * t.inverse * to_axes.transpose()).diagonal().cwiseMin(1);
-  find_inverse();
+  const VectorXd variances = (to_axes * t.inverse * to_axes.transpose()).diagonal().cwiseMin(1);
+  t.other_variance = beside + kFourthMoment * bends * variances.cwiseAbs2();
 }
 
 /// The step of Gauss and Newton from `at`, where numbers `simulated` were found.
@@ -289,7 +290,7 @@ CircuitSolver::Slopes CircuitSolver::find_slopes(const VectorXd& at, const Matri
   MatrixXd values(found.front().mean.size(), 2 * n + 1), along(values.rows(), n);
   for (Index k = 0; k <= 2 * n; ++k) values.col(k) = found[static_cast<std::size_t>(k)].mean;
   for (Index k = 0; k < n; ++k) along.col(k) = (values.col(2 * k + 2) - values.col(2 * k + 1)) / (2 * reach);
-  Slopes result;
+  Slopes result{found.front(), {}, {}};
   // along = slopes axes
   result.slopes = axes.transpose().triangularView<Eigen::Upper>().solve(along.transpose()).transpose();
   result.bends.resize(values.rows(), n);

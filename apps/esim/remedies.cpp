@@ -33,6 +33,8 @@ Advice advice_on(Remedy remedy) {
       return {"--slow-motion", " (--start, --duration, --slow-motion)"};
     case Remedy::shift_times:
       return {"--shift", "; shift the second one with --shift SECONDS"};
+    case Remedy::keep_samples:
+      return {"", " (esim simulate --keep-samples)"};
     case Remedy::none:
       break;
   }

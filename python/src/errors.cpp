@@ -34,7 +34,8 @@ std::string with_remedy(const std::string& message, Remedy remedy) {
       return message + " with width= and height=";
     case Remedy::shorter_video:
       return message + " (start_s=, duration_s=, slow_motion=)";
-    case Remedy::shift_times:  // not in Python
+    case Remedy::shift_times:   // not in Python
+    case Remedy::keep_samples:  // the message says it
     case Remedy::none:
       break;
   }

@@ -214,7 +214,7 @@ class Recordings(Cli):
         for arguments, problem in (
             ([self.out, "--out", again], "--force"),
             ([self.out, "--out", new, "--set", "camera.width=9"], "--set camera.width: cannot be changed without"),
-            ([again, "--out", new], "has no samples"),
+            ([again, "--out", new], "has no samples; simulate again with output.samples=true (esim simulate --keep-samples)"),
         ):
             result = run("resense", *arguments)
             self.assertEqual(result.returncode, 2)

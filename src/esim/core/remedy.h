@@ -18,6 +18,7 @@ enum class Remedy {
   sensor_size,      ///< state the size of the sensor
   shorter_video,    ///< show a part of the recording, or play it faster
   shift_times,      ///< shift the times of a recording
+  keep_samples,     ///< simulate again, and keep what the event sensors saw
 };
 
 /// A UserError with a remedy. The message itself names neither a flag nor an argument.

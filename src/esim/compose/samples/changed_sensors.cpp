@@ -8,6 +8,7 @@
 #include "esim/compose/samples/samples_file.h"
 #include "esim/compose/samples/stored_samples.h"
 #include "esim/core/error.h"
+#include "esim/core/remedy.h"
 #include "esim/motion/static.h"
 #include "esim/scenario/read.h"
 
@@ -103,8 +104,10 @@ SampleStoreReader open_samples(const ChangedSensors& sensors, std::size_t camera
   const fs::path file = sensors.recording / options.name / kSamplesFile;
   std::error_code error;
   if (!fs::is_regular_file(file, error)) {
-    throw UserError(fmt::format(
-        "{}: does not exist: the recording has no samples; simulate again with output.samples=true", file.string()));
+    throw RemediableError(
+        fmt::format("{}: does not exist: the recording has no samples; simulate again with output.samples=true",
+                    file.string()),
+        Remedy::keep_samples);
   }
   SampleStoreReader store(file, read_ahead);
   const SampleStoreInfo& info = store.info();

@@ -48,7 +48,8 @@ class CircuitModel {
 
   EventCameraOptions sensor_at(const Eigen::VectorXd& p) const;
 
-  /// The same by formulas: within some 10 % under lamps; noise_rate_hz() in constant light.
+  /// The same by formulas: within some 10 % under lamps that make more than one event in a period; noise_rate_hz() in
+  /// constant light.
   Eigen::VectorXd approximate(const Eigen::VectorXd& p) const;
 
   /// At each point, with its seed. Lamps are seen by the same pixels, whose thresholds deviate alike.

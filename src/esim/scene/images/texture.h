@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "esim/core/image.h"
+#include "esim/core/large_vector.h"
 #include "esim/scene/images/box_filter.h"
 
 namespace cv {
@@ -136,7 +137,7 @@ class Texture {
   std::array<float, kMaxLevels> level_width_{}, level_height_{}, level_squared_u_{}, level_squared_v_{};
   std::array<float, kMaxLevels> level_blur_{};  // what the square width of the taps leaves to the level's texels
   std::array<std::int32_t, kMaxLevels> level_offset_{}, level_stride_{};  // bytes
-  std::vector<std::uint16_t> codes_;  // all levels, row-major, with their continuations
+  LargeVector<std::uint16_t> codes_;  // all levels, row-major, with their continuations
 };
 
 template <int K>

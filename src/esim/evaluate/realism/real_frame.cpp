@@ -44,8 +44,7 @@ Image<float> read_frame(const fs::path& path, int width, int height) {
   return frame;
 }
 
-/// Replaces rows and columns at the border that are black, as pictures of undistorted frames have them, by those beside
-/// them.
+/// Replaces rows and columns at the border that are black by those beside them.
 void replace_black_border(Image<float>& frame) {
   const int width = frame.width(), height = frame.height();
   const auto is_black = [&](int x0, int y0, int dx, int dy, int n) {

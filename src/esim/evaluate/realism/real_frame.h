@@ -15,7 +15,7 @@ struct RealFrame {
 
 /// Reads an 8-bit PNG image of the sensor's size, or with the frame below another one in its left column.
 ///
-/// Black lines at the border, as of undistorted frames, are replaced by what is beside them. Gradual changes of
+/// Black lines at the border are replaced by what is beside them. Gradual changes of
 /// brightness over the frame are taken for vignetting: a quadratic polynomial of the logarithm, found by iteratively
 /// reweighted least squares, so that objects hardly change it. The rest is the scene, without noise: a bilateral filter
 /// of 2.5 px averages values that differ by less than about three standard deviations of the noise. Scene and frame are

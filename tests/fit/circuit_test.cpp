@@ -51,13 +51,13 @@ TEST(FitCircuit, FindsNoise) {
 
 /// A lamp that makes `per_period` ON and OFF events of each pixel, and whose frequency is said to be `stated_hz`.
 PixelCounts lamp(const KnownLight& light, std::uint32_t per_period, double duration_s = 1,
-                 std::optional<double> stated_hz = {}) {
-  PixelCounter counter({light.lux, stated_hz.value_or(light.frequency_hz), light.modulation}, kSmall, kSmall);
+                 std::optional<double> stated_hz = {}, int side = kSmall) {
+  PixelCounter counter({light.lux, stated_hz.value_or(light.frequency_hz), light.modulation}, side, side);
   std::vector<Event> events;
   for (int period = 0; period < duration_s * light.frequency_hz; ++period) {
     for (std::uint32_t k = 0; k < 2 * per_period; ++k) {
-      for (std::uint16_t y = 0; y < kSmall; ++y) {
-        for (std::uint16_t x = 0; x < kSmall; ++x) {
+      for (std::uint16_t y = 0; y < side; ++y) {
+        for (std::uint16_t x = 0; x < side; ++x) {
           const double phase = period + 0.9 * k / (2.0 * per_period);
           events.push_back(
               {to_ns(phase / light.frequency_hz), x, y, static_cast<std::int8_t>(k < per_period ? 1 : -1)});
@@ -155,9 +155,12 @@ TEST(FitCircuit, ApproximateNumbersAreNearThoseOfTheCircuit) {
 TEST(FitCircuit, NumbersOfNoSensorDetermineNothing) {
   EventCameraOptions base = test::random_circuit(1, test::kLampNoise);
   base.refractory_period_us = 20;
+  const auto few_pixels = [](const KnownLight& light, std::uint32_t per_period) {
+    return lamp(light, per_period, 0.2, {}, 12);  // each of which makes as many events
+  };
   // More events at the higher frequency.
   EXPECT_TRUE(test::contains(
-      reason({lamp({100, 100, 0.5}, 1, 0.2), lamp({10, 100, 0.5}, 4, 0.2), lamp({100, 1000, 0.5}, 5, 0.2)}, base,
+      reason({few_pixels({100, 100, 0.5}, 1), few_pixels({10, 100, 0.5}, 4), few_pixels({100, 1000, 0.5}, 5)}, base,
              "contrast_threshold_on"),
       "no sensor of this kind"));
 }

@@ -54,6 +54,13 @@ class Fit(ProgramTest):
         self.assertIn("no recording of a moving scene", found["contrast_threshold_on"]["reason"])
         self.assertIsNone(found["leak_rate_hz"]["value"])
 
+    def test_pairs_of_events_with_one_time_stamp(self):
+        pairs = self.folder / "pairs.txt"
+        pairs.write_text("".join(f"{0.001 * (k // 2):.6f} {k // 2 % 10} 0 {k % 2}\n" for k in range(2000)))
+        result = run("fit", pairs, "--width", "10", "--height", "10", "--out", self.folder / "pairs", "--quiet")
+        self.assertEqual(result.returncode, 0, result.stderr)
+        self.assertRegex(result.stdout, r"refractory_period_us +\| 0 us ")
+
     def lamp(self, name, periods=40, pixels=10):
         """A lamp of 50 Hz: three ON events of each pixel, then three OFF events."""
         path = self.folder / name

@@ -349,10 +349,11 @@ class SensorFitter {
     refractory_s_ = 1e-6 * (found.determined()                 ? found.value
                             : std::isnan(shortest.shortest_us) ? 0.0
                                                                : shortest.shortest_us);
-    if (!shortest.intervals_us.empty() && found.determined()) {
+    if (!found.determined()) return;
+    const double low = found.value, high = shortest.intervals_us.back();
+    if (high > low) {  // not if all are 0, as with several events of a pixel in one time stamp
       FittedDistribution d;
       d.title = "Shortest intervals of the pixels", d.axis = "interval (us)", d.values = shortest.intervals_us;
-      const double low = found.value, high = d.values.back();
       d.density = [low, high](double x) { return x < low || x > high ? 0.0 : 1 / (high - low); };
       fit_.distributions.push_back(std::move(d));
     }

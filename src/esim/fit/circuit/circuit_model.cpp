@@ -17,7 +17,7 @@ constexpr double kSoft = 0.2;  // of the thresholds: the transition of events_of
 // references are equally probable, which is not so later: of a lamp with 1.6 ON events in a period, their number
 // decreases by 4 % after 4 periods, by 1 % after 12, and no more after 18.
 constexpr double kSettlingEvents = 64, kLampEvents = 24, kSettlingNoise = 4, kNoiseEvents = 4;
-constexpr double kFewestPeriods = 8, kMostPeriods = 40, kLongest_s = 20;
+constexpr double kMinPeriods = 8, kMaxPeriods = 40, kLongest_s = 20;
 
 void set_value(EventCameraOptions& o, CircuitModel::Index k, double value) {
   switch (k) {
@@ -132,8 +132,8 @@ PixelCounts CircuitModel::simulate_lamp(const EventCameraOptions& o, std::size_t
   const double events = recorded_[k] + recorded_[k + 1];  // in a period
   const double response = TimeConstants(*o.circuit, light.lux).latency_s() * light.frequency_hz;
   const double settling =
-      std::clamp(std::ceil(std::max(kSettlingEvents / events, 4 * response)), kFewestPeriods, kMostPeriods);
-  const double extent = std::clamp(std::ceil(kLampEvents / events), kFewestPeriods, kMostPeriods);
+      std::clamp(std::ceil(std::max(kSettlingEvents / events, 4 * response)), kMinPeriods, kMaxPeriods);
+  const double extent = std::clamp(std::ceil(kLampEvents / events), kMinPeriods, kMaxPeriods);
   return simulate_counts(o, light, settling, extent, effort.lamp_side, seed, effort.points);
 }
 

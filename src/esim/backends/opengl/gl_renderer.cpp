@@ -9,6 +9,7 @@
 #include <optional>
 #include <utility>
 
+#include "esim/backends/opengl/gl_borrowed.h"
 #include "esim/backends/opengl/gl_context.h"
 #include "esim/backends/opengl/gl_program.h"
 #include "esim/backends/opengl/gl_read_back.h"
@@ -102,17 +103,10 @@ class GlRenderer final : public Renderer {
   }
 
  private:
-  /// A frame that the device renders. Borrows buffers from the renderer.
+  /// A frame that the device renders.
   struct UnderWay final : Rendering {
     UnderWay(GlRenderer& from, RenderRequest asked, GlDeformed objects)
-        : renderer(from), request(std::move(asked)), deformed(std::move(objects)) {
-      if (renderer.idle_.empty()) renderer.idle_.push_back(std::make_unique<GlReadBack>());
-      read_back = std::move(renderer.idle_.back());
-      renderer.idle_.pop_back();
-    }
-    ~UnderWay() override { renderer.idle_.push_back(std::move(read_back)); }
-    UnderWay(const UnderWay&) = delete;
-    UnderWay& operator=(const UnderWay&) = delete;
+        : renderer(from), request(std::move(asked)), deformed(std::move(objects)), read_back(from.idle_) {}
 
     void finish(Sample& sample) override {
       prepare({&request, 1}, renderer.camera_.width, renderer.camera_.height, sample, renderer.deforms());
@@ -126,7 +120,7 @@ class GlRenderer final : public Renderer {
     GlRenderer& renderer;
     RenderRequest request;
     GlDeformed deformed;
-    std::unique_ptr<GlReadBack> read_back;
+    GlBorrowed<GlReadBack> read_back;
   };
 
   bool deforms() const { return !scene_->deforming().empty(); }

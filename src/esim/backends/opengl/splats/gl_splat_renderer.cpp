@@ -12,6 +12,7 @@
 #include <string>
 #include <utility>
 
+#include "esim/backends/opengl/gl_borrowed.h"
 #include "esim/backends/opengl/gl_buffer.h"
 #include "esim/backends/opengl/gl_context.h"
 #include "esim/backends/opengl/gl_program.h"
@@ -93,16 +94,10 @@ class GlSplatRenderer final : public Renderer {
     GLsync done = nullptr;
   };
 
-  /// A frame that the device renders. Borrows a buffer from the renderer.
+  /// A frame that the device renders.
   struct UnderWay final : Rendering {
-    UnderWay(GlSplatRenderer& from, RenderRequest asked) : renderer(from), request(std::move(asked)) {
-      if (renderer.idle_.empty()) renderer.idle_.push_back(std::make_unique<ReadBack>());
-      read_back = std::move(renderer.idle_.back());
-      renderer.idle_.pop_back();
-    }
-    ~UnderWay() override { renderer.idle_.push_back(std::move(read_back)); }
-    UnderWay(const UnderWay&) = delete;
-    UnderWay& operator=(const UnderWay&) = delete;
+    UnderWay(GlSplatRenderer& from, RenderRequest asked)
+        : renderer(from), request(std::move(asked)), read_back(from.idle_) {}
 
     void finish(Sample& sample) override {
       prepare({&request, 1}, renderer.camera_.width, renderer.camera_.height, sample);
@@ -112,7 +107,7 @@ class GlSplatRenderer final : public Renderer {
 
     GlSplatRenderer& renderer;
     RenderRequest request;
-    std::unique_ptr<ReadBack> read_back;
+    GlBorrowed<ReadBack> read_back;
     GLuint max_items = 0;  // in the lists when the device was told to render
   };
 

@@ -128,9 +128,9 @@ TEST(FitCircuit, LampsThatDetermineNothingSayWhy) {
 TEST(FitCircuit, FewPointsOfALampGiveTheNumbersOfMany) {
   const EventCameraOptions sensor = test::random_circuit(1, test::kLampNoise);
   const auto events = [&](int points) {
+    const PixelCounts counts = simulate_counts(sensor, {300, 50, 0.6}, 8, 8, kSmall, 1, points);
     double sum = 0;
-    for (const PixelCounts::Pixel& p : simulate_counts(sensor, {300, 50, 0.6}, 8, 8, kSmall, 1, points).pixels.pixels())
-      sum += p.on + p.off;
+    for (const PixelCounts::Pixel& p : counts.pixels.pixels()) sum += p.on + p.off;
     return sum;
   };
   EXPECT_NEAR(events(16) / events(256), 1, 5e-3);  // the fundamental of 16 points is smaller by 1.3 %

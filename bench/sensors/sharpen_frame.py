@@ -1,11 +1,10 @@
 """Copies a clip of a real sensor with a sharper frame, to see what the blur of the frame changes:
 
-    bench/sensors/sharpen_frame.py CLIP OUT [SIGMA_PX]
+    python3 bench/sensors/sharpen_frame.py CLIP OUT [SIGMA_PX]
 
 CLIP is a folder as for `esim evaluate realism` (docs/methods/realism.md), whose frame is in the second row and first column of
 its picture. The sharper frame is 2 p - G p, where G is a Gaussian of SIGMA_PX (default: 0.6): it raises the contrast of
-structures of 2 px by 1.8, and of those of 4 px by 1.4. OUT becomes CLIP with this frame. Needs numpy
-and OpenCV."""
+structures of 2 px by 1.8, and of those of 4 px by 1.4. OUT, a new folder, becomes CLIP with this frame. Needs numpy and OpenCV."""
 
 import pathlib
 import shutil

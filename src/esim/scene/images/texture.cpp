@@ -37,7 +37,7 @@ Texture::Texture(const Image<float>& texels, Wrap wrap_u, Wrap wrap_v) : wrap_u_
     return light;
   });
   scale_ = scale_for(brightest);
-  // All levels have twice the area of the first, and 3.4 times the sides.
+  // Enough for all levels: together, they have twice the area of the first, and 3.4 times its sides.
   constexpr std::size_t kBeyond = kBefore + kAfter;
   const std::size_t sides = static_cast<std::size_t>(texels.width()) + static_cast<std::size_t>(texels.height());
   codes_.reserve(2 * texels.size() + 4 * kBeyond * sides + kMaxLevels * kBeyond * kBeyond);

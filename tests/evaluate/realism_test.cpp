@@ -222,6 +222,41 @@ TEST(Realism, AReadoutOfRowsIsFitted) {
   EXPECT_LT(found.clips[1].sum_of_deviations(), 0.7 * found.clips[0].sum_of_deviations());
 }
 
+/// The frames that the chip takes are found in the recording, and their coupling is fitted to the bursts of events.
+TEST(Realism, TheCouplingOfFramesIsFitted) {
+  const test::TemporaryDirectory folder;
+  write_scene(folder.path() / "clip");
+  constexpr double kCoupling = 0.04;
+  EventCameraOptions sensor = preset_options("davis240c");
+  sensor.contrast_threshold = 0.2, sensor.hot_pixels = 0, sensor.readout = {};
+  CircuitOptions& circuit = *sensor.circuit;
+  circuit.noise = 0, circuit.frame_coupling = kCoupling;
+  // The camera starts 5 ms before the clip, in which exposures are from 7 to 13 and from 32 to 38 ms.
+  circuit.frame_rate_hz = 40, circuit.frame_exposure_ms = 6, circuit.frame_offset_ms = 15;
+  record(folder.path() / "clip", sensor);
+  const std::optional<FrameTimes> frames = read_real_clip(folder.path() / "clip").frames;
+  ASSERT_TRUE(frames && frames->period && frames->exposure());
+  EXPECT_NEAR(to_seconds(*frames->period), 0.025, 2e-4);
+  EXPECT_NEAR(to_seconds(*frames->exposure()), 0.006, 2e-4);
+  EXPECT_NEAR(to_seconds(*frames->end), 0.013, 2e-4);
+
+  EventCameraOptions base = sensor;
+  base.circuit->frame_coupling = 0, base.circuit->frame_offset_ms = 0, base.circuit->frame_rate_hz.reset();
+  base.contrast_threshold = 0.25;
+  RealismOptions options;
+  options.frame_step_s = 1e-3, options.history_s = 0.03;
+  options.fit_to = ClipPart{"clip", 0, 0.5};
+  const RealismEvaluation found = evaluate_realism(folder.path(), {{"base", base, {}}}, options, {});
+  const std::vector<Estimate>& estimates = found.fitted.at(0).fit.estimates;
+  const auto coupling = std::find_if(estimates.begin(), estimates.end(),
+                                     [](const Estimate& e) { return e.name == "circuit.frame_coupling"; });
+  ASSERT_TRUE(coupling != estimates.end() && coupling->determined()) << coupling->reason;
+  EXPECT_TRUE(coupling->low <= kCoupling && kCoupling <= coupling->high) << coupling->low << " to " << coupling->high;
+  EXPECT_NEAR(coupling->value, kCoupling, 0.01);
+  EXPECT_EQ(found.fitted[0].fit.options.circuit->frame_coupling, coupling->value);
+  EXPECT_TRUE(test::contains(describe(found), "clip: frames every 25.0 ms, exposed for 6.0")) << describe(found);
+}
+
 TEST(Realism, APartWithFewEventsDeterminesNothing) {
   const test::TemporaryDirectory folder;
   write_scene(folder.path() / "clip");

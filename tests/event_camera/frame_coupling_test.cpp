@@ -24,11 +24,12 @@ CircuitOptions framed() {
 
 constexpr double kOneNs = kCoupling / 10e-6 * 1e-9;  // the steepest change within it
 
-/// By its definition, t in s.
-double defined(double t) {
+/// By its definition, t and the offset in s.
+double defined(double t, double offset) {
   const double half = 0.5e-3 * kExposure_ms;
-  for (int frame = 1; frame < 20; ++frame) {
-    const double begin = frame / kRate_hz - half, end = frame / kRate_hz + half;
+  for (int frame = -30; frame < 20; ++frame) {
+    const double begin = offset + frame / kRate_hz - half, end = offset + frame / kRate_hz + half;
+    if (begin <= 0) continue;
     if (t >= begin && t < end) return -kCoupling * std::min(1.0, (t - begin) / 200e-6);
     if (t >= end && t < end + 10e-6) return -kCoupling * (1 - (t - end) / 10e-6);
   }
@@ -36,27 +37,33 @@ double defined(double t) {
 }
 
 TEST(FrameCoupling, IsLinearBetweenItsCorners) {
-  const FrameCoupling coupling(framed());
-  ASSERT_TRUE(coupling.active());
   EXPECT_FALSE(FrameCoupling({.frame_rate_hz = kRate_hz, .frame_exposure_ms = kExposure_ms}).active());
   std::mt19937_64 random(1);
-  int corners = 0;
-  for (TimeNs t = 0; t < 500 * kNsPerMs; ++corners) {
-    const TimeNs corner = coupling.next_corner(t);
-    ASSERT_GT(corner, t);
-    const Ramp ramp = coupling.at(static_cast<double>(t));
-    for (int i = 0; i < 20; ++i) {
-      const double s = static_cast<double>(random() % static_cast<std::uint64_t>(corner - t));
-      const double there = static_cast<double>(t) + s;
-      EXPECT_NEAR(ramp.value + ramp.slope * s, defined(1e-9 * there), kOneNs) << there;
-      EXPECT_NEAR(coupling.at(there).value, defined(1e-9 * there), kOneNs) << there;
+  for (const double offset_ms : {0.0, 2.0, 10.0, 46.0, 1000.0}) {
+    CircuitOptions options = framed();
+    options.frame_offset_ms = offset_ms;
+    const FrameCoupling coupling(options);
+    ASSERT_TRUE(coupling.active());
+    int corners = 0;
+    for (TimeNs t = 0; t < 500 * kNsPerMs; ++corners) {
+      const TimeNs corner = coupling.next_corner(t);
+      ASSERT_GT(corner, t);
+      const Ramp ramp = coupling.at(static_cast<double>(t));
+      for (int i = 0; i < 20; ++i) {
+        const double s = static_cast<double>(random() % static_cast<std::uint64_t>(corner - t));
+        const double there = static_cast<double>(t) + s;
+        EXPECT_NEAR(ramp.value + ramp.slope * s, defined(1e-9 * there, 1e-3 * offset_ms), kOneNs) << there;
+        EXPECT_NEAR(coupling.at(there).value, defined(1e-9 * there, 1e-3 * offset_ms), kOneNs) << there;
+      }
+      EXPECT_NEAR(ramp.value + ramp.slope * static_cast<double>(corner - t),
+                  coupling.at(static_cast<double>(corner)).value, 1e-12)
+          << "no jump at " << corner;
+      t = corner;
     }
-    EXPECT_NEAR(ramp.value + ramp.slope * static_cast<double>(corner - t),
-                coupling.at(static_cast<double>(corner)).value, 1e-12)
-        << "no jump at " << corner;
-    t = corner;
+    if (offset_ms == 0) {
+      EXPECT_EQ(corners, 4 * 11 + 1);  // 11 frames, and the beginning of the next one
+    }
   }
-  EXPECT_EQ(corners, 4 * 11 + 1);  // 11 frames in half a second, and the beginning of the next one
 }
 
 TEST(CornerDivider, DividesAtCornersWithTheIrradianceThere) {

@@ -113,7 +113,7 @@ void add_realism(CLI::App& evaluate, int& exit_code) {
       ->add_option(
           "--fit-to", arguments->fit_to,
           "Also fit each sensor to this part of a clip, in fractions of its duration: thresholds, refractory period, "
-          "readout and leak. Of that clip, only the rest is then compared")
+          "readout, leak and frame coupling. Of that clip, only the rest is then compared")
       ->type_name("CLIP:FROM:TO");
   command
       ->add_option("--save-fitted", arguments->save, "Write the fitted sensors to this folder, as SENSOR_fitted.yaml")

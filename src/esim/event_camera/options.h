@@ -81,6 +81,7 @@ struct CircuitOptions {
   double frame_coupling = 0.0;
   std::optional<double> frame_rate_hz{};      ///< unset: kUsualFrameRate_hz
   std::optional<double> frame_exposure_ms{};  ///< unset: kUsualFrameExposure_ms
+  double frame_offset_ms = 0.0;
 
   double threshold_mismatch_common = 0.0;
   double noise_mismatch_decades = 0.0;
@@ -233,6 +234,8 @@ void describe(Visitor& visit, CircuitOptions& o) {
         About{"rate of these frames (default: that of frame_camera; without one: 22.7)", "Hz", 0.01, 1e4});
   visit("frame_exposure_ms", o.frame_exposure_ms,
         About{"their exposure (default: exposure_s of frame_camera; without one: 6)", "ms", 0.2, 1e5});
+  visit("frame_offset_ms", o.frame_offset_ms,
+        About{"middle of one of their exposures, after the start of the simulation", "ms", 0, 1e6});
   visit("threshold_mismatch_common", o.threshold_mismatch_common,
         About{"relative standard deviation, from pixel to pixel, that both thresholds share", "", 0, 1});
   visit("noise_mismatch_decades", o.noise_mismatch_decades,

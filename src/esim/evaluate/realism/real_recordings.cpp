@@ -164,6 +164,7 @@ RealClip RealClip::part(double from, double to) const {
   clip.start_s += from * duration_s, clip.duration_s *= to - from;
   const TimeNs first = to_ns(from * duration_s), last = to_ns(to * duration_s);
   clip.events.clear();
+  if (frames) clip.frames = frames->since(first);
   for (const Event& event : events_within(events, {first, last}))
     clip.events.push_back({event.t - first, event.x, event.y, event.polarity});
   return clip;
@@ -195,6 +196,7 @@ RealClip read_real_clip(const fs::path& folder) {
   const TimeNs start = clip.events.front().t;
   for (Event& event : clip.events) event.t -= start;
   clip.duration_s = clip.complete_s = to_seconds(clip.events.back().t);
+  clip.frames = find_frames(clip.events);
   return clip;
 }
 

@@ -2,12 +2,14 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "esim/core/image.h"
 #include "esim/evaluate/realism/real_frame.h"
 #include "esim/events/event.h"
+#include "esim/stats/sensor/frame_times.h"
 #include "esim/stats/sensor/integer_histogram.h"
 
 // Private to evaluate.
@@ -18,10 +20,11 @@ struct RealClip {
   std::string name;
   std::vector<Event> events;  ///< from time 0 on
   double duration_s = 0;
-  RealFrame frame;              ///< at the middle of the complete recording
-  Image<float> flow_x, flow_y;  ///< displacement of each pixel during the complete recording, px
-  double start_s = 0;           ///< of this part, after the start of the complete recording
-  double complete_s = 0;        ///< duration of the complete recording
+  RealFrame frame;                   ///< at the middle of the complete recording
+  Image<float> flow_x, flow_y;       ///< displacement of each pixel during the complete recording, px
+  double start_s = 0;                ///< of this part, after the start of the complete recording
+  double complete_s = 0;             ///< duration of the complete recording
+  std::optional<FrameTimes> frames;  ///< when the chip took frames, found in the complete recording
 
   /// A rectangle of pixels.
   struct Region {

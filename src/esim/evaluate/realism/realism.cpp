@@ -46,25 +46,57 @@ class Scratch {
   fs::path path_;
 };
 
-/// A whole second, so that the frames of a chip do not depend on the duration of the history.
+/// The times of the moving frames, s after the start of the clip, from its history to its end.
+std::vector<double> frame_times(const RealClip& clip, const RealismOptions& options) {
+  const auto steps_in = [](double s, double step_s) {
+    return static_cast<std::int64_t>(std::floor(s / step_s + 1e-9));
+  };
+  std::vector<double> times;
+  const double before_s = static_cast<double>(steps_in(options.before_s, options.frame_step_s)) * options.frame_step_s;
+  for (std::int64_t k = steps_in(options.history_s - before_s, options.history_step_s); k > 0; --k)
+    times.push_back(-before_s - static_cast<double>(k) * options.history_step_s);
+  for (double s = -before_s; s < clip.duration_s + options.frame_step_s; s += options.frame_step_s) times.push_back(s);
+  return times;
+}
+
+/// Time stamps are not negative.
 double start_of_clip(const RealismOptions& options) { return std::ceil(options.history_s); }
 
 /// Calls see(image, t) for the frames of a clip, from its history to its end.
 template <typename See>
 void for_each_frame(const RealClip& clip, const RealismOptions& options, const See& see) {
-  const auto steps_in = [](double s, double step_s) {
-    return static_cast<std::int64_t>(std::floor(s / step_s + 1e-9));
+  for (const double s : frame_times(clip, options)) see(clip.image_at(s), to_ns(start_of_clip(options) + s));
+}
+
+/// A sensor whose chip takes frames when that of the clip did, as far as this is known.
+EventCameraOptions with_frames_of(const RealClip& clip, EventCameraOptions sensor, double first_frame_s) {
+  if (!sensor.circuit || !clip.frames) return sensor;
+  constexpr double kRest_ms = 0.1;  // between exposures
+  const auto ms = [](const std::optional<TimeNs>& time, double otherwise) {
+    return time ? 1e3 * to_seconds(*time) : otherwise;
   };
-  const auto see_at = [&](double s) { see(clip.image_at(s), to_ns(start_of_clip(options) + s)); };
-  const double before_s = static_cast<double>(steps_in(options.before_s, options.frame_step_s)) * options.frame_step_s;
-  for (std::int64_t k = steps_in(options.history_s - before_s, options.history_step_s); k > 0; --k)
-    see_at(-before_s - static_cast<double>(k) * options.history_step_s);
-  for (double s = -before_s; s < clip.duration_s + options.frame_step_s; s += options.frame_step_s) see_at(s);
+  CircuitOptions& circuit = *sensor.circuit;
+  const FrameTimes& frames = *clip.frames;
+  double period_ms = ms(frames.period, circuit.frame_period_ms()),
+         exposure_ms = ms(frames.exposure(), circuit.exposure_ms());
+  if (exposure_ms > period_ms - kRest_ms) {
+    if (frames.period)
+      exposure_ms = period_ms - kRest_ms;
+    else
+      period_ms = exposure_ms + kRest_ms;
+  }
+  const double middle_ms =
+      frames.start ? ms(frames.start, 0) + 0.5 * exposure_ms : ms(frames.end, 0) - 0.5 * exposure_ms;
+  const double offset_ms = middle_ms - 1e3 * first_frame_s;
+  circuit.frame_rate_hz = 1e3 / period_ms, circuit.frame_exposure_ms = exposure_ms;
+  circuit.frame_offset_ms = offset_ms - period_ms * std::floor(offset_ms / period_ms);
+  return sensor;
 }
 
 std::vector<Event> simulate(const SensorModel& model, const RealClip& clip, const RealismOptions& options) {
   const Workers workers(options.threads);
-  EventCamera camera(model.options, clip.frame.scene.width(), clip.frame.scene.height(), options.seed);
+  EventCamera camera(with_frames_of(clip, model.options, frame_times(clip, options).front()), clip.frame.scene.width(),
+                     clip.frame.scene.height(), options.seed);
   std::vector<Event> events;
   for_each_frame(clip, options,
                  [&](const Image<float>& image, TimeNs t) { camera.process(image, t, events, workers); });
@@ -111,7 +143,7 @@ std::vector<Event> run_command(const SensorModel& model, const RealClip& clip, c
 }
 
 /// Of the pixels whose simulation sees only what the frame shows, during the clip.
-SensorStatistics statistics_of(EventSpan events, const RealClip& clip) {
+ClipStatistics statistics_of(EventSpan events, const RealClip& clip) {
   const auto [left, top, width, height] = clip.region_inside();
   std::vector<Event> compared;
   for (const Event& event : events) {
@@ -121,7 +153,9 @@ SensorStatistics statistics_of(EventSpan events, const RealClip& clip) {
   }
   SensorStatisticsCounter counter(SensorSize{width, height});
   counter.add(compared);
-  return std::move(counter).finish();
+  ClipStatistics statistics{std::move(counter).finish(), {}};
+  if (clip.frames) statistics.bursts = count_burst_events(compared, *clip.frames);
+  return statistics;
 }
 
 /// The events of the clip's own time, from 0 on.
@@ -228,7 +262,7 @@ RealClip part_to_fit(const RealRecordings& real, const ClipPart& part) {
 /// of times.
 SimulationFit fit_to_clip(const SensorModel& model, const RealClip& clip, RealismOptions options,
                           const std::function<bool(const std::string&)>& goes_on) {
-  constexpr double kHistory_s = 0.25;
+  constexpr double kHistory_s = 1;
   options.history_s = std::min(options.history_s, kHistory_s);
   const auto simulated = [&](const EventCameraOptions& sensor) {
     if (!goes_on(model.name + ": fit to " + clip.name)) throw Interrupted();
@@ -244,6 +278,9 @@ RealismEvaluation evaluate_realism(const fs::path& folder, const std::vector<Sen
                                    const std::function<bool(double, const std::string&)>& progress) {
   const RealRecordings real = read_real_recordings(folder);
   RealismEvaluation evaluation;
+  for (const RealClip& clip : real.clips) {
+    if (clip.frames) evaluation.frames.push_back({clip.name, *clip.frames});
+  }
   std::vector<SensorModel> models = given;  // and after each event camera the fitted one
   if (options.fit_to) {
     const RealClip seen = part_to_fit(real, *options.fit_to);
@@ -267,7 +304,7 @@ RealismEvaluation evaluate_realism(const fs::path& folder, const std::vector<Sen
   };
   for (const RealClip& whole : real.clips) {
     const RealClip clip = compared_part(whole, options.fit_to);
-    const SensorStatistics truth = statistics_of(clip.events, clip);
+    const SensorStatistics truth = statistics_of(clip.events, clip).sensor;
     std::unique_ptr<Scratch> scratch;  // with the frames for other programs
     for (const SensorModel& model : models) {
       if (!goes_on(clip.name, model)) return evaluation;
@@ -281,9 +318,9 @@ RealismEvaluation evaluate_realism(const fs::path& folder, const std::vector<Sen
                                 : run_command(model, clip, scratch->path() / "frames",
                                               scratch->path() / fmt::format("events{}.txt", evaluation.clips.size()));
       const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
-      evaluation.clips.push_back({clip.name, model.name,
-                                  compare_sensors(truth, statistics_of(within_clip(events, clip, options), clip)),
-                                  seconds});
+      evaluation.clips.push_back(
+          {clip.name, model.name,
+           compare_sensors(truth, statistics_of(within_clip(events, clip, options), clip).sensor), seconds});
     }
   }
   for (const RealNoise& noise : real.noise) {

@@ -9,6 +9,7 @@
 #include "esim/compare/likeness.h"
 #include "esim/event_camera/options.h"
 #include "esim/fit/simulated/simulation_fit.h"
+#include "esim/stats/sensor/frame_times.h"
 
 namespace esim::inline evaluate {
 
@@ -65,13 +66,21 @@ struct FittedModel {
 };
 inline constexpr const char* kFitted = ", fitted";
 
+/// When the chip of a clip took frames, found by the events that they cause.
+struct ClipFrames {
+  std::string clip;
+  FrameTimes frames;
+};
+
 struct RealismEvaluation {
+  std::vector<ClipFrames> frames;
   std::vector<FittedModel> fitted;
   std::vector<ClipResult> clips;
   std::vector<NoiseResult> noise;
 };
 
-/// Compares models with the real recordings in a folder (docs/methods/realism.md). Other programs are compared with
+/// Compares models with the real recordings in a folder (docs/methods/realism.md). If the chip of a clip took frames,
+/// those of the event cameras have the same times. Other programs are compared with
 /// clips only. `progress` gets the finished part, 0 to 1, and what is next; false ends the evaluation, which then
 /// returns what is finished. Throws UserError if the folder contains no recordings, or if a command fails.
 RealismEvaluation evaluate_realism(const std::filesystem::path& folder, const std::vector<SensorModel>& models,

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "esim/evaluate/realism/realism.h"
 #include "esim/files/markdown_table.h"
@@ -67,14 +68,28 @@ std::string tables_of(const std::vector<Result>& results, const Name& name, cons
   return text;
 }
 
+std::string frames_text(const FrameTimes& frames) {
+  const auto ms = [](TimeNs t) { return 1e3 * to_seconds(t); };
+  return fmt::format(
+      "{}, {}", frames.period ? fmt::format("frames every {:.1f} ms", ms(*frames.period)) : "one frame",
+      frames.exposure() ? fmt::format("exposed for {:.1f} ms", ms(*frames.exposure())) : "with an unknown exposure");
+}
+
 nlohmann::ordered_json number(double value) {
   return std::isfinite(value) ? nlohmann::ordered_json(value) : nlohmann::ordered_json(nullptr);
+}
+
+nlohmann::ordered_json seconds(const std::optional<TimeNs>& time) {
+  return time ? nlohmann::ordered_json(to_seconds(*time)) : nlohmann::ordered_json(nullptr);
 }
 
 }  // namespace
 
 std::string describe(const RealismEvaluation& evaluation) {
   std::string text;
+  for (const ClipFrames& each : evaluation.frames)
+    text += fmt::format("{}: {} (found by bursts of events)\n", each.clip, frames_text(each.frames));
+  if (!text.empty()) text += "\n";
   for (const FittedModel& fitted : evaluation.fitted)
     text += fmt::format("{}{} ({} simulations)\n\n{}\n", fitted.model, kFitted, fitted.fit.simulations,
                         describe(fitted.fit));
@@ -133,7 +148,16 @@ std::string to_json(const RealismEvaluation& evaluation) {
     }
     fitted.push_back({{"model", f.model}, {"simulations", f.fit.simulations}, {"parameters", parameters}});
   }
-  return nlohmann::ordered_json{{"fitted", fitted}, {"clips", clips}, {"noise", noise}}.dump(2) + "\n";
+  nlohmann::ordered_json frames = nlohmann::ordered_json::array();
+  for (const ClipFrames& each : evaluation.frames) {
+    frames.push_back({{"clip", each.clip},
+                      {"start_s", seconds(each.frames.start)},
+                      {"end_s", seconds(each.frames.end)},
+                      {"period_s", seconds(each.frames.period)},
+                      {"exposure_s", seconds(each.frames.exposure())}});
+  }
+  return nlohmann::ordered_json{{"frames", frames}, {"fitted", fitted}, {"clips", clips}, {"noise", noise}}.dump(2) +
+         "\n";
 }
 
 }  // namespace esim::inline evaluate

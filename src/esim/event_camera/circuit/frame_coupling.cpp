@@ -26,10 +26,10 @@ Image<float> irradiance_at(const Segment& segment, TimeNs t) {
 
 Ramp FrameCoupling::at(double t) const {
   // The frame that began last.
-  double frame = std::floor((t + 0.5 * static_cast<double>(exposure_)) / period_);
+  double frame = std::floor((t - offset_ + 0.5 * static_cast<double>(exposure_)) / period_);
   while (static_cast<double>(start(frame + 1)) <= t) ++frame;
   while (static_cast<double>(start(frame)) > t) --frame;
-  if (frame < 1) return {};
+  if (frame < first_) return {};
   const double since = t - static_cast<double>(start(frame)), end = static_cast<double>(exposure_);
   const double fall = coupling_ / static_cast<double>(kFall), rise = coupling_ / static_cast<double>(kRise);
   if (since < static_cast<double>(kFall)) return {-fall * since, -fall};
@@ -39,7 +39,7 @@ Ramp FrameCoupling::at(double t) const {
 }
 
 TimeNs FrameCoupling::next_corner(TimeNs t) const {
-  for (double frame = std::max(1.0, std::floor(static_cast<double>(t) / period_) - 1);; ++frame) {
+  for (double frame = std::max(first_, std::floor((static_cast<double>(t) - offset_) / period_) - 1);; ++frame) {
     const TimeNs begin = start(frame), end = begin + exposure_;
     for (const TimeNs corner : {begin, begin + kFall, end, end + kRise}) {
       if (corner > t) return corner;

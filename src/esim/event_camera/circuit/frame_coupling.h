@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cmath>
 #include <deque>
 #include <span>
 #include <vector>
@@ -17,8 +18,9 @@ struct Ramp {
 };
 
 /// What frames that the chip exposes beside the events add to the input of all comparators: -frame_coupling during each
-/// exposure, which it reaches within 200 us and leaves within 10 us. Frame k, from 1 on, is centred on k /
-/// frame_rate_hz after the epoch, as those of a frame camera.
+/// exposure, which it reaches within 200 us and leaves within 10 us. Frame k is centred on frame_offset_ms + k /
+/// frame_rate_hz after the epoch; without an offset as those of a frame camera. The first frame is the first whose
+/// exposure begins after the epoch.
 class FrameCoupling {
  public:
   static constexpr TimeNs kFall = 200 * kNsPerUs, kRise = 10 * kNsPerUs;
@@ -26,7 +28,9 @@ class FrameCoupling {
   explicit FrameCoupling(const CircuitOptions& options)
       : coupling_(options.frame_coupling),
         period_(1e6 * options.frame_period_ms()),
-        exposure_(static_cast<TimeNs>(1e6 * options.exposure_ms())) {}
+        offset_(1e6 * options.frame_offset_ms),
+        exposure_(static_cast<TimeNs>(1e6 * options.exposure_ms())),
+        first_(std::floor((0.5 * static_cast<double>(exposure_) - offset_) / period_) + 1) {}
 
   bool active() const { return coupling_ != 0; }
 
@@ -38,10 +42,11 @@ class FrameCoupling {
 
  private:
   /// The start of an exposure.
-  TimeNs start(double frame) const { return static_cast<TimeNs>(frame * period_) - exposure_ / 2; }
+  TimeNs start(double frame) const { return static_cast<TimeNs>(offset_ + frame * period_) - exposure_ / 2; }
 
-  double coupling_, period_;
+  double coupling_, period_, offset_;
   TimeNs exposure_;
+  double first_;  // frame
 };
 
 /// Divides segments at the corners of the coupling, by interpolating the irradiance.

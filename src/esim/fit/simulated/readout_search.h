@@ -1,12 +1,12 @@
 #pragma once
 
+#include <functional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "esim/event_camera/options.h"
 #include "esim/fit/estimate.h"
-#include "esim/fit/simulated/simulation_fit.h"
 #include "esim/stats/sensor/sensor_statistics.h"
 
 // Private to fit.
@@ -16,8 +16,9 @@ namespace esim::inline fit {
 /// events per time stamp (docs/methods/fitting.md, section 4).
 class ReadoutSearch {
  public:
-  ReadoutSearch(const SensorStatistics& real, SimulatedStatistics simulate)
-      : real_(real), simulate_(std::move(simulate)) {}
+  using Simulate = std::function<SensorStatistics(const EventCameraOptions&)>;
+
+  ReadoutSearch(const SensorStatistics& real, Simulate simulate) : real_(real), simulate_(std::move(simulate)) {}
 
   /// Changes the readout of a sensor, whose numbers of events must be those of the recording.
   void run(EventCameraOptions& sensor);
@@ -40,7 +41,7 @@ class ReadoutSearch {
   void unknown(const char* name, const char* unit, std::string why);
 
   const SensorStatistics& real_;
-  SimulatedStatistics simulate_;
+  Simulate simulate_;
   ReadoutOptions rows_;  // the best one
   double best_ = 0;      // its sum of deviations
   std::vector<Estimate> estimates_;

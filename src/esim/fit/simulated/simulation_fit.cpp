@@ -11,6 +11,7 @@
 
 #include "esim/compare/likeness.h"
 #include "esim/fit/sensor_fit.h"
+#include "esim/fit/simulated/coupling_match.h"
 #include "esim/fit/simulated/readout_search.h"
 
 namespace esim::inline fit {
@@ -21,6 +22,8 @@ constexpr std::uint64_t kFewestIntervals = 500;
 constexpr std::uint64_t kFewestQuiet = 20;  // events in quiet areas
 constexpr int kMostSteps = 12;
 constexpr double kClose = 0.004;         // relative distance of matched numbers
+constexpr double kNear = 0.05;           // the same, to average over
+constexpr double kCloseCoupling = 0.1;   // change of the logarithm of the coupling
 constexpr double kChange = 1.15;         // of a parameter, for derivatives
 constexpr double kWidestInterval = 0.5;  // half a 95 % interval, in units of the logarithm
 constexpr double kMaxExcess = 3;  // simulated events in quiet areas, in recorded ones, if the simulated scene is wrong
@@ -41,19 +44,23 @@ struct Moments {
 
 class ClipFitter {
  public:
-  ClipFitter(const EventCameraOptions& base, const SensorStatistics& real, const SimulatedStatistics& simulate)
-      : base_(base), real_(real), target_(real), simulate_(simulate) {
-    fit_.options = base;
-  }
+  ClipFitter(const EventCameraOptions& base, const ClipStatistics& real, const SimulatedClip& simulate)
+      : base_(base),
+        real_(real.sensor),
+        target_(real.sensor),
+        simulate_(simulate),
+        fit_{base, {}},
+        coupling_(real.bursts, fit_.options) {}
 
   SimulationFit run() {
     if (!target_.enough()) {
       const std::string why = fmt::format("the recording has {} ON and {} OFF events; {} of each are necessary",
                                           real_.on, real_.events - real_.on, kFewestOfPolarity);
-      for (const char* name :
-           {"contrast_threshold_on", "contrast_threshold_off", "refractory_period_us", "leak_rate_hz",
-            "readout.time_stamp_us", "readout.row_wait_us", "readout.row_time_us", "readout.column_coupling"})
+      for (const char* name : {"contrast_threshold_on", "contrast_threshold_off", "refractory_period_us",
+                               "leak_rate_hz", "circuit.frame_coupling", "readout.time_stamp_us", "readout.row_wait_us",
+                               "readout.row_time_us", "readout.column_coupling"})
         unknown(name, "", why);
+      fit_.options = base_;
       return std::move(fit_);
     }
     allow_rate();
@@ -62,11 +69,12 @@ class ClipFitter {
     find_readout();
     match();
     find_intervals();
+    fit_.estimates.push_back(coupling_.finish(fit_.options, trouble_));
     return std::move(fit_);
   }
 
  private:
-  SensorStatistics simulate(const EventCameraOptions& options) {
+  ClipStatistics simulate(const EventCameraOptions& options) {
     ++fit_.simulations;
     return simulate_(options);
   }
@@ -134,7 +142,8 @@ class ClipFitter {
     for (int step = 0; step < kMostSteps; ++step) {
       set_leak();
       EventCameraOptions& o = fit_.options;
-      const Moments found(simulate(o));
+      const ClipStatistics simulated = simulate(o);
+      const Moments found(simulated.sensor);
       if (!found.enough()) {
         o = base_;
         trouble_ = fmt::format("the simulated sensor has {} ON and {} OFF events", found.on, found.off);
@@ -144,9 +153,10 @@ class ClipFitter {
       const double missing_us = intervals ? target_.shortest_us - found.shortest_us : 0;
       const double before_us = o.refractory_period_us,
                    refractory_us = std::clamp(before_us + missing_us, 0.0, longest_us);
-      if (std::max({std::abs(on - 1), std::abs(off - 1), std::abs(refractory_us - before_us) / target_.shortest_us}) <
-          kClose)
-        break;
+      const double distance =
+          std::max({std::abs(on - 1), std::abs(off - 1), std::abs(refractory_us - before_us) / target_.shortest_us});
+      const double factor = coupling_.step(o, simulated.bursts, distance < kNear);
+      if (distance < kClose && std::abs(std::log(factor)) < kCloseCoupling) break;
       const double c_on = o.threshold_on() * on, c_off = o.threshold_off() * off;
       o.contrast_threshold_on = c_on, o.contrast_threshold_off = c_off;
       o.refractory_period_us = refractory_us;
@@ -156,22 +166,22 @@ class ClipFitter {
 
   void find_readout() {
     if (!trouble_.empty()) return;
-    ReadoutSearch search(real_, [&](const EventCameraOptions& o) { return simulate(o); });
+    ReadoutSearch search(real_, [&](const EventCameraOptions& o) { return simulate(o).sensor; });
     search.run(fit_.options);
     for (Estimate& e : search.take_estimates()) fit_.estimates.push_back(std::move(e));
   }
 
   /// The covariance of the parameters from that of the matched numbers, by derivatives of the simulation.
   void find_intervals() {
-    std::vector<Estimate> found;
     const auto fail = [&](const std::string& why) {
+      trouble_ = why;
       unknown("contrast_threshold_on", "", why);
       unknown("contrast_threshold_off", "", why);
       unknown("refractory_period_us", "us", why);
     };
     if (!trouble_.empty()) return fail(trouble_);
     const EventCameraOptions& o = fit_.options;
-    const SensorStatistics at = simulate(o);
+    const SensorStatistics at = simulate(o).sensor;
     const double excess = at.quiet.rate_hz() / real_.quiet.rate_hz();
     if (leak_quiet_hz_ > 0 && excess > kMaxExcess) {
       fit_.options.contrast_threshold_on = base_.threshold_on();
@@ -193,7 +203,7 @@ class ClipFitter {
       if (k == 1)
         changed.contrast_threshold_on = o.threshold_on(), changed.contrast_threshold_off = o.threshold_off() * kChange;
       if (k == 2) changed.refractory_period_us += step_us;
-      slopes.col(k) = (Moments(simulate(changed)).logarithms() - here) / std::log(kChange);
+      slopes.col(k) = (Moments(simulate(changed).sensor).logarithms() - here) / std::log(kChange);
     }
     const Eigen::Vector3d scatter = scatter_of_moments(at);
     const Eigen::Matrix3d inverse = slopes.inverse();
@@ -252,17 +262,18 @@ class ClipFitter {
   const EventCameraOptions& base_;
   const SensorStatistics& real_;
   Moments target_;
-  const SimulatedStatistics& simulate_;
+  const SimulatedClip& simulate_;
   SimulationFit fit_;
-  std::string trouble_;
+  CouplingMatch coupling_;
+  std::string trouble_;  // why the sensor was not fitted
   double leak_events_ = 0, leak_quiet_hz_ = 0;
   std::optional<Estimate> leak_;
 };
 
 }  // namespace
 
-SimulationFit fit_by_simulation(const EventCameraOptions& base, const SensorStatistics& real,
-                                const SimulatedStatistics& simulate) {
+SimulationFit fit_by_simulation(const EventCameraOptions& base, const ClipStatistics& real,
+                                const SimulatedClip& simulate) {
   return ClipFitter(base, real, simulate).run();
 }
 

@@ -34,7 +34,7 @@ double CouplingMatch::step(EventCameraOptions& sensor, const std::optional<Burst
   const double kept = near ? kKept : 0, before = coupling;
   coupling_ = kept * coupling_ + coupling;
   events_ = kept * events_ + simulated->events;
-  variance_ = kept * kept * variance_ + simulated->deviation * simulated->deviation;
+  deviation_ = kept * deviation_ + simulated->deviation;  // all have the same pixels
   // The events in bursts are about proportional to the coupling.
   const double wanted = real_.events * coupling_ / std::max(1.0, events_);
   coupling = std::clamp(wanted, before / kMostChange, std::min(kMost, before * kMostChange));
@@ -45,7 +45,7 @@ Estimate CouplingMatch::finish(EventCameraOptions& sensor, const std::string& tr
   constexpr const char* kName = "circuit.frame_coupling";
   std::string why = unknown_.empty() ? trouble : unknown_;
   const double reach =
-      kNormalQuantile * std::hypot(real_.deviation / real_.events, std::sqrt(variance_) / std::max(1.0, events_));
+      kNormalQuantile * std::hypot(real_.deviation / real_.events, deviation_ / std::max(1.0, events_));
   if (why.empty() && !(reach < 1)) why = kTooFew;
   if (!why.empty()) {
     if (sensor.circuit) sensor.circuit->frame_coupling = given_;

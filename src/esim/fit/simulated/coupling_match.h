@@ -28,7 +28,7 @@ class CouplingMatch {
   std::string unknown_;  // why, if not empty
   double given_ = 0;     // coupling
   BurstEvents real_;
-  double coupling_ = 0, events_ = 0, variance_ = 0;  // weighted sums over simulations
+  double coupling_ = 0, events_ = 0, deviation_ = 0;  // weighted sums over simulations
 };
 
 }  // namespace esim::inline fit

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include "esim/stats/numerics/median.h"
 
@@ -55,8 +56,9 @@ std::vector<TimeNs> find_onsets(EventSpan events, bool on) {
   std::vector<Window> windows;
   std::vector<double> sizes;
   const double part = static_cast<double>(kBurst) / static_cast<double>(kBefore);
-  for (TimeNs t = first_possible(events), after = 0; after + kBefore <= events.back().t; t += kStep) {
-    after = t + kBurst + kSkipped;
+  const TimeNs last = events.back().t - kBurst - kSkipped - kBefore;
+  for (TimeNs t = first_possible(events); t <= last; t += kStep) {
+    const TimeNs after = t + kBurst + kSkipped;
     const double expected =
         part * std::max(times.within(t - kSkipped - kBefore, t - kSkipped), times.within(after, after + kBefore));
     const double beyond = times.within(t, t + kBurst) - expected;

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <optional>
-#include <vector>
 
 #include "esim/core/time.h"
 #include "esim/events/event.h"
@@ -20,8 +19,8 @@ struct FrameTimes {
   FrameTimes since(TimeNs moment) const;
 };
 
-/// Finds frames by these bursts, in events in order of time. Empty if no burst is certain, if bursts do not recur
-/// periodically, or if exposures differ.
+/// Finds frames by these bursts, in events in order of time, of seconds (2 MB per second). Empty if no burst is
+/// certain, if bursts do not recur periodically, or if exposures differ.
 std::optional<FrameTimes> find_frames(EventSpan events);
 
 /// Events in the bursts of all frames, beyond those that the milliseconds before them let expect.

@@ -46,8 +46,8 @@ class Scratch {
   fs::path path_;
 };
 
-/// The times of the moving frames, s after the start of the clip, from its history to its end.
-std::vector<double> frame_times(const RealClip& clip, const RealismOptions& options) {
+/// The times of the images, s after the start of the clip, from its history to its end.
+std::vector<double> image_times(const RealClip& clip, const RealismOptions& options) {
   const auto steps_in = [](double s, double step_s) {
     return static_cast<std::int64_t>(std::floor(s / step_s + 1e-9));
   };
@@ -59,17 +59,17 @@ std::vector<double> frame_times(const RealClip& clip, const RealismOptions& opti
   return times;
 }
 
-/// Time stamps are not negative.
+/// When the clip starts, s: so late that no time stamp of its history is negative.
 double start_of_clip(const RealismOptions& options) { return std::ceil(options.history_s); }
 
 /// Calls see(image, t) for the frames of a clip, from its history to its end.
 template <typename See>
 void for_each_frame(const RealClip& clip, const RealismOptions& options, const See& see) {
-  for (const double s : frame_times(clip, options)) see(clip.image_at(s), to_ns(start_of_clip(options) + s));
+  for (const double s : image_times(clip, options)) see(clip.image_at(s), to_ns(start_of_clip(options) + s));
 }
 
 /// A sensor whose chip takes frames when that of the clip did, as far as this is known.
-EventCameraOptions with_frames_of(const RealClip& clip, EventCameraOptions sensor, double first_frame_s) {
+EventCameraOptions with_frames_of(const RealClip& clip, EventCameraOptions sensor, double first_image_s) {
   if (!sensor.circuit || !clip.frames) return sensor;
   constexpr double kRest_ms = 0.1;  // between exposures
   const auto ms = [](const std::optional<TimeNs>& time, double otherwise) {
@@ -87,7 +87,7 @@ EventCameraOptions with_frames_of(const RealClip& clip, EventCameraOptions senso
   }
   const double middle_ms =
       frames.start ? ms(frames.start, 0) + 0.5 * exposure_ms : ms(frames.end, 0) - 0.5 * exposure_ms;
-  const double offset_ms = middle_ms - 1e3 * first_frame_s;
+  const double offset_ms = middle_ms - 1e3 * first_image_s;
   circuit.frame_rate_hz = 1e3 / period_ms, circuit.frame_exposure_ms = exposure_ms;
   circuit.frame_offset_ms = offset_ms - period_ms * std::floor(offset_ms / period_ms);
   return sensor;
@@ -95,7 +95,7 @@ EventCameraOptions with_frames_of(const RealClip& clip, EventCameraOptions senso
 
 std::vector<Event> simulate(const SensorModel& model, const RealClip& clip, const RealismOptions& options) {
   const Workers workers(options.threads);
-  EventCamera camera(with_frames_of(clip, model.options, frame_times(clip, options).front()), clip.frame.scene.width(),
+  EventCamera camera(with_frames_of(clip, model.options, image_times(clip, options).front()), clip.frame.scene.width(),
                      clip.frame.scene.height(), options.seed);
   std::vector<Event> events;
   for_each_frame(clip, options,

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <map>
 #include <random>
 
 #include "esim/backends/raycast/raster/clipped_triangles.h"
@@ -112,12 +113,24 @@ TEST(RasterRenderer, SharedEdgesHaveNeitherCracksNorDoubleCoverage) {
 double searched(const std::vector<Eigen::Vector3f>& corners, const std::vector<float>& albedos, const Camera& camera,
                 int x, int y, double background) {
   constexpr int kGrid = 24;
+  std::vector<std::size_t> near;  // triangles that are partly behind the camera, or whose box meets that of the pixel
+  for (std::size_t k = 0; k < albedos.size(); ++k) {
+    const auto beyond = [&](int axis, double to, float sign) {  // in the direction of the sign
+      return std::ranges::all_of(std::span(corners).subspan(3 * k, 3), [&](const Eigen::Vector3f& corner) {
+        const Eigen::Vector2d at(corner.x() / corner.z() * camera.fx + camera.cx,
+                                 corner.y() / corner.z() * camera.fy + camera.cy);
+        return corner.z() > 0.1F && sign * (at[axis] - to) > 0;
+      });
+    };
+    if (!beyond(0, x + 1, 1) && !beyond(0, x - 1, -1) && !beyond(1, y + 1, 1) && !beyond(1, y - 1, -1))
+      near.push_back(k);
+  }
   double sum = 0;
   for (int i = 0; i < kGrid * kGrid; ++i) {
     const Eigen::Vector3d ray((x + (i % kGrid + 0.5) / kGrid - 0.5 - camera.cx) / camera.fx,
                               (y + (i / kGrid + 0.5) / kGrid - 0.5 - camera.cy) / camera.fy, 1);
     double nearest = std::numeric_limits<double>::infinity(), value = background;
-    for (std::size_t k = 0; k < albedos.size(); ++k) {
+    for (const std::size_t k : near) {
       const Eigen::Vector3d a = corners[3 * k].cast<double>(), b = corners[3 * k + 1].cast<double>(),
                             c = corners[3 * k + 2].cast<double>(), normal = (b - a).cross(c - a);
       const double z = normal.dot(a) / normal.dot(ray);  // of the point on the plane
@@ -164,6 +177,118 @@ void expect_random_triangles(int triangles, double largest, double rms) {
 TEST(RasterRenderer, RandomTrianglesAreWhatASlowSearchSees) { expect_random_triangles(12, 0.06, 0.006); }
 
 TEST(RasterRenderer, ManyRandomTrianglesAreWhatASlowSearchSees) { expect_random_triangles(60, 0.12, 0.02); }
+
+/// An octahedron, divided `times` times, with the corners of a sphere moved by up to `dents` of its radius.
+std::vector<Eigen::Vector3f> dented_ball(const Eigen::Vector3f& centre, float radius, float dents, int times,
+                                         std::mt19937& random) {
+  std::vector<Eigen::Vector3f> corners;
+  for (const float x : {-1.0F, 1.0F})
+    for (const float y : {-1.0F, 1.0F})
+      for (const float z : {-1.0F, 1.0F})
+        for (const Eigen::Vector3f& corner : {Eigen::Vector3f(x, 0, 0), {0, y, 0}, {0, 0, z}})
+          corners.push_back(corner);
+  for (int k = 0; k < times; ++k) {
+    std::vector<Eigen::Vector3f> finer;
+    for (std::size_t i = 0; i < corners.size(); i += 3) {
+      const auto middle = [&](std::size_t a, std::size_t b) {
+        return Eigen::Vector3f((corners[i + a] + corners[i + b]).normalized());
+      };
+      const Eigen::Vector3f ab = middle(0, 1), bc = middle(1, 2), ca = middle(2, 0);
+      for (const Eigen::Vector3f& corner :
+           {corners[i], ab, ca, corners[i + 1], bc, ab, corners[i + 2], ca, bc, ab, bc, ca})
+        finer.push_back(corner);
+    }
+    corners = finer;
+  }
+  std::uniform_real_distribution<float> moved(1 - dents, 1.0F);
+  std::map<std::array<float, 3>, Eigen::Vector3f> places;  // one for all triangles at a corner
+  for (Eigen::Vector3f& corner : corners) {
+    const std::array<float, 3> key{corner.x(), corner.y(), corner.z()};
+    if (!places.contains(key)) places[key] = centre + radius * moved(random) * corner;
+    corner = places[key];
+  }
+  return corners;
+}
+
+TEST(RasterRenderer, ConnectedBodiesAreWhatASlowSearchSees) {
+  // Dented balls, each of one colour, whose triangles are larger and smaller than a pixel: outlines, folds, backs, and
+  // bodies that meet.
+  std::mt19937 random(11);
+  std::uniform_real_distribution<float> across(-0.7F, 0.7F), depth(1.5F, 2.5F), size(0.15F, 0.7F), albedo(0.0F, 1.0F);
+  const Camera model = test::distorted_camera(0);
+  double squares = 0, count = 0;
+  for (int mesh = 0; mesh < 40; ++mesh) {
+    std::vector<Eigen::Vector3f> corners;
+    Mesh bodies;
+    std::vector<float> albedos;
+    for (std::uint16_t body = 0; body < 4; ++body) {
+      const float z = depth(random), dents = std::array{0.0F, 0.1F, 0.4F}[static_cast<std::size_t>(mesh) % 3];
+      const Eigen::Vector3f centre(z * across(random), z * across(random), z);
+      const auto ball = dented_ball(centre, size(random), dents, 2 + body % 2, random);
+      bodies.materials.push_back({"plain", nullptr, albedo(random)});
+      corners.insert(corners.end(), ball.begin(), ball.end());
+      bodies.material.resize(corners.size() / 3, body);
+      albedos.resize(corners.size() / 3, bodies.materials.back().base);
+    }
+    bodies.vertices = corners;
+    for (std::uint32_t i = 0; i < albedos.size(); ++i) bodies.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+    bodies.texture_uv.resize(albedos.size(), {Eigen::Vector2f(0, 0), Eigen::Vector2f(0, 0), Eigen::Vector2f(0, 0)});
+    const Sample sample = seen(still_scene(bodies), model, 16, 0.3F);
+    std::uniform_int_distribution<int> column(0, model.width - 1), row(0, model.height - 1);
+    for (int i = 0; i < 200; ++i) {
+      const int x = column(random), y = row(random);
+      const double error = static_cast<double>(sample.irradiance(x, y)) - searched(corners, albedos, model, x, y, 0.3);
+      EXPECT_LT(std::abs(error), 0.06) << mesh << ": " << x << ", " << y;
+      squares += error * error, ++count;
+    }
+  }
+  EXPECT_LT(std::sqrt(squares / count), 0.008);
+}
+
+TEST(RasterRenderer, FineTrianglesShowTheTextureOfTheirSurface) {
+  // A slanted textured square of two triangles, and of thousands with corners anywhere in it.
+  std::mt19937 random(17);
+  std::uniform_real_distribution<float> grey(0.2F, 1.0F), jitter(-0.3F, 0.3F);
+  Image<float> picture(64, 64);
+  for (float& e : picture.pixels()) e = grey(random);
+  const auto texture = std::make_shared<const Texture>(picture, Wrap::clamp, Wrap::clamp);
+  const auto square = [&](int cells) {
+    Mesh mesh;
+    mesh.materials.push_back({"picture", texture, 1.0F});
+    std::vector<Eigen::Vector2f> uv;
+    for (int row = 0; row <= cells; ++row) {
+      for (int column = 0; column <= cells; ++column) {
+        const auto inside = [&](int k) {
+          const float moved = k > 0 && k < cells ? jitter(random) : 0.0F;
+          return (static_cast<float>(k) + moved) / static_cast<float>(cells);
+        };
+        const float u = inside(column), v = inside(row);
+        uv.emplace_back(u, v);
+        mesh.vertices.emplace_back(4 * u - 2, 4 * v - 2, 2 + 0.8F * u);
+      }
+    }
+    for (int row = 0; row < cells; ++row) {
+      for (int column = 0; column < cells; ++column) {
+        const auto at = [&](int dx, int dy) {
+          return static_cast<std::uint32_t>((row + dy) * (cells + 1) + column + dx);
+        };
+        for (const auto& corners : {std::array{at(0, 0), at(1, 0), at(1, 1)}, {at(0, 0), at(1, 1), at(0, 1)}}) {
+          mesh.triangles.push_back(corners);
+          mesh.texture_uv.push_back({uv[corners[0]], uv[corners[1]], uv[corners[2]]});
+          mesh.material.push_back(0);
+        }
+      }
+    }
+    return still_scene(mesh);
+  };
+  const Camera model = test::distorted_camera(0);
+  const Sample expected = seen(square(1), model);
+  for (const int cells : {9, 40, 90}) {
+    const Sample actual = seen(square(cells), model);
+    for (std::size_t i = 0; i < expected.irradiance.pixels().size(); ++i)
+      ASSERT_NEAR(actual.irradiance.pixels()[i], expected.irradiance.pixels()[i], 2e-3) << cells << ": pixel " << i;
+  }
+}
 
 TEST(RasterRenderer, ManySmallTrianglesHaveTheOutlineOfTheirSurface) {
   // The black half-plane in triangles of 0.4 px, of which a pixel sees a dozen.

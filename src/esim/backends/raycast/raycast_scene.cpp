@@ -118,7 +118,9 @@ std::uint32_t RaycastScene::append_triangles(const std::vector<const Mesh*>& mes
       for (const auto& [a, b, c] : mesh->triangles)
         normals.push_back({mesh->normals[a], mesh->normals[b], mesh->normals[c]});
     }
+    const std::size_t begin = shading.size();
     for (std::size_t i = 0; i < mesh->triangles.size(); ++i) shading.emplace_back(*mesh, i, first_material);
+    if (use_.surfaces) connect(*mesh, use_.normals, std::span(shading).subspan(begin));
   }
   // Up to the end of a page; the triangles that follow are flat.
   const std::size_t rest = normals.size() % SceneTriangles::kPage;

@@ -2,6 +2,7 @@
 
 #include <bit>
 #include <cmath>
+#include <type_traits>
 
 #include "esim/backends/raycast/raster/convex.h"
 
@@ -11,19 +12,21 @@ namespace {
 using D = EightFloats;
 constexpr int kColumns = static_cast<int>(hn::MaxLanes(D()));
 
-/// A linear function on a rectangle of bearings: its value in the middle, and how much it differs at most.
-struct OnRectangle {
-  float middle, reach;
+/// A linear function of the bearing in all lanes, and half of its range in a pixel.
+struct WideFunction {
+  hn::Vec<D> x, y, one, reach;
 
-  OnRectangle(const OfBearing& f, const BearingBounds& on)
-      : middle(f.at(0.5F * (on.left + on.right), 0.5F * (on.top + on.bottom))),
-        reach(0.5F * (std::fabs(f.x) * (on.right - on.left) + std::fabs(f.y) * (on.bottom - on.top))) {}
+  HWY_INLINE hn::Vec<D> at(hn::Vec<D> bearing_x, hn::Vec<D> bearing_y) const {
+    return hn::MulAdd(x, bearing_x, hn::MulAdd(y, bearing_y, one));
+  }
 };
 
-/// Bound of the rounding error of f at a bearing of the cell.
-float rounding(const OfBearing& f, float extent) {
-  constexpr float kRounding = 3e-7F;
-  return kRounding * extent * std::max(std::max(std::fabs(f.x), std::fabs(f.y)), std::fabs(f.one));
+/// A bit for each weight of a mask of the weights and the inverse depth.
+template <class Mask>
+unsigned edges_of(Mask mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(hn::FixedTag<float, 4>(), mask, bits);
+  return bits[0] & 7U;
 }
 
 }  // namespace
@@ -60,69 +63,89 @@ void CellSurfaces::scan(const ScreenTriangle& triangle, const BearingBounds& bou
   const D d;
   using V = hn::Vec<D>;
 
-  // Edges that do not cross the cell need no tests.
-  struct Edge {
-    OfBearing weight;
-    float reach;  // half of the range of the weight in a pixel
+  // The weights, and the inverse depth.
+  const hn::FixedTag<float, 4> d4;
+  const auto x4 = hn::Load(d4, triangle.x.data()), y4 = hn::Load(d4, triangle.y.data());
+  const auto one4 = hn::Load(d4, triangle.one.data()), size_x = hn::Abs(x4), size_y = hn::Abs(y4);
+  const auto half_range = [&](float half_width, float half_height) {
+    return hn::MulAdd(size_x, hn::Set(d4, half_width), hn::Mul(size_y, hn::Set(d4, half_height)));
   };
-  std::array<Edge, 3> edges;
-  std::size_t edge_count = 0;
-  for (std::size_t k = 0; k < 3; ++k) {
-    const OfBearing weight = triangle.weight(k);
-    const OnRectangle range(weight, cell.bounds);
-    const float error = rounding(weight, cell.extent);
-    if (range.middle + range.reach < -error) return;
-    const float reach = std::fabs(weight.x) * cell.half_width + std::fabs(weight.y) * cell.half_height + error;
-    if (range.middle - range.reach > reach) continue;
-    edges[edge_count++] = {weight, reach};
-  }
+  const BearingBounds& on = cell.bounds;
+  const auto middle = hn::MulAdd(x4, hn::Set(d4, 0.5F * (on.left + on.right)),
+                                 hn::MulAdd(y4, hn::Set(d4, 0.5F * (on.top + on.bottom)), one4));
+  const auto in_cell = half_range(0.5F * (on.right - on.left), 0.5F * (on.bottom - on.top));
+  constexpr float kRounding = 3e-7F;
+  const auto error = hn::Mul(hn::Set(d4, kRounding * cell.extent), hn::Max(hn::Max(size_x, size_y), hn::Abs(one4)));
+  const auto reach = hn::Add(half_range(cell.half_width, cell.half_height), error);
+  if ((edges_of(hn::Lt(hn::Add(middle, in_cell), hn::Neg(error)))) != 0) return;
+  // Edges that do not cross the cell need no tests.
+  const unsigned crossing = edges_of(hn::Le(hn::Sub(middle, in_cell), reach));
+  alignas(16) std::array<float, 4> reaches;
+  hn::Store(reach, d4, reaches.data());
   const Range columns = cell.column.range(bounds.left, bounds.right), rows = cell.row.range(bounds.top, bounds.bottom);
   const int first_column = std::max(columns.first, part.columns.first);
   const int last_column = std::min(columns.last, part.columns.last);
   const int first_row = std::max(rows.first, part.rows.first), last_row = std::min(rows.last, part.rows.last);
   if (first_column > last_column || first_row > last_row) return;
 
-  const OfBearing z = triangle.inverse_depth();
-  const float z_reach = std::fabs(z.x) * cell.half_width + std::fabs(z.y) * cell.half_height + rounding(z, cell.extent);
-  const V zx = hn::Set(d, z.x), zy = hn::Set(d, z.y), z1 = hn::Set(d, z.one), zr = hn::Set(d, z_reach);
+  const auto wide = [&](std::size_t k) {
+    return WideFunction{hn::Set(d, triangle.x[k]), hn::Set(d, triangle.y[k]), hn::Set(d, triangle.one[k]),
+                        hn::Set(d, reaches[k])};
+  };
+  const WideFunction inverse_depth = wide(3);
+  std::array<WideFunction, 3> edges;
+  std::size_t edge_count = 0;
+  for (unsigned left = crossing; left != 0; left &= left - 1)
+    edges[edge_count++] = wide(static_cast<std::size_t>(std::countr_zero(left)));
   const V zero = hn::Zero(d), max = hn::Set(d, 1 / kNearestDepth);
   const V min_depth = hn::Set(d, triangle.farthest), max_depth = hn::Set(d, triangle.nearest);
   const auto id = static_cast<std::uint32_t>(triangles_.size());
   const std::size_t found_before = found_count_;
-  for (int row = first_row; row <= last_row; ++row) {
-    for (int column = first_column / kColumns * kColumns; column <= last_column; column += kColumns) {
-      const auto k = static_cast<std::size_t>(row * ImageCell::kWidth + column);
-      const V x = hn::Load(d, &cell.x[k]), y = hn::Load(d, &cell.y[k]);
-      const V depth = hn::MulAdd(zx, x, hn::MulAdd(zy, y, z1));
-      const V farthest = hn::Max(hn::Sub(depth, zr), min_depth), nearest = hn::Min(hn::Add(depth, zr), max_depth);
-      const V hidden = hn::Load(d, &hidden_below_[k]);
-      auto visible = hn::And(hn::Ge(nearest, hidden), hn::And(hn::Gt(nearest, zero), hn::Lt(farthest, max)));
-      auto fills = hn::And(hn::Gt(farthest, zero), hn::Lt(nearest, max));
-      for (std::size_t e = 0; e < edge_count; ++e) {
-        const Edge& edge = edges[e];
-        const V weight = hn::MulAdd(hn::Set(d, edge.weight.x), x,
-                                    hn::MulAdd(hn::Set(d, edge.weight.y), y, hn::Set(d, edge.weight.one)));
-        const V reach = hn::Set(d, edge.reach);
-        visible = hn::And(visible, hn::Gt(hn::Add(weight, reach), zero));
-        fills = hn::And(fills, hn::Gt(weight, reach));
-      }
-      unsigned bits = bits_of(visible);
-      const int skipped = std::max(0, first_column - column), kept = std::min(kColumns, last_column - column + 1);
-      bits &= ((1U << kept) - 1) & ~((1U << skipped) - 1);
-      if (bits == 0) continue;
-      fills = hn::And(fills, visible);
-      const unsigned fills_bits = bits_of(fills);
-      // Only pixels that are wanted are read later.
-      hn::Store(hn::IfThenElse(fills, hn::Max(hidden, farthest), hidden), d, &hidden_below_[k]);
-      if (found_.size() < found_count_ + kColumns) found_.resize(2 * found_.size() + 1024);
-      alignas(64) std::array<float, 8> nearest_values;
-      hn::Store(nearest, d, nearest_values.data());
-      for (; bits != 0; bits &= bits - 1) {
-        const auto lane = static_cast<unsigned>(std::countr_zero(bits));
-        found_[found_count_++] = {id, nearest_values[lane], static_cast<std::uint16_t>(k + lane),
-                                  static_cast<std::uint16_t>(fills_bits >> lane & 1U)};
+  const auto scan_rows = [&](auto count) {
+    for (int row = first_row; row <= last_row; ++row) {
+      for (int next = first_column; next <= last_column; next += kColumns) {
+        const int column = std::min(next, ImageCell::kWidth - kColumns);
+        const auto k = static_cast<std::size_t>(row * ImageCell::kWidth + column);
+        const V x = hn::LoadU(d, &cell.x[k]), y = hn::LoadU(d, &cell.y[k]), depth = inverse_depth.at(x, y);
+        const V farthest = hn::Max(hn::Sub(depth, inverse_depth.reach), min_depth);
+        const V nearest = hn::Min(hn::Add(depth, inverse_depth.reach), max_depth);
+        const V hidden = hn::LoadU(d, &hidden_below_[k]);
+        auto visible = hn::And(hn::Ge(nearest, hidden), hn::And(hn::Gt(nearest, zero), hn::Lt(farthest, max)));
+        auto fills = hn::And(hn::Gt(farthest, zero), hn::Lt(nearest, max));
+        for (std::size_t e = 0; e < count; ++e) {
+          const V weight = edges[e].at(x, y);
+          visible = hn::And(visible, hn::Gt(hn::Add(weight, edges[e].reach), zero));
+          fills = hn::And(fills, hn::Gt(weight, edges[e].reach));
+        }
+        unsigned bits = bits_of(visible);
+        const int skipped = next - column, kept = std::min(kColumns, last_column - column + 1);
+        bits &= ((1U << kept) - 1) & ~((1U << skipped) - 1);
+        if (bits == 0) continue;
+        fills = hn::And(fills, visible);
+        const unsigned fills_bits = bits_of(fills);
+        // Only pixels that are wanted are read later.
+        if (fills_bits != 0) hn::StoreU(hn::IfThenElse(fills, hn::Max(hidden, farthest), hidden), d, &hidden_below_[k]);
+        if (found_.size() < found_count_ + kColumns) found_.resize(2 * found_.size() + 1024);
+        alignas(64) std::array<float, 8> nearest_values;
+        hn::Store(nearest, d, nearest_values.data());
+        Candidate* to = &found_[found_count_];
+        found_count_ += static_cast<std::size_t>(std::popcount(bits));
+        for (; bits != 0; bits &= bits - 1) {
+          const auto lane = static_cast<unsigned>(std::countr_zero(bits));
+          *to++ = {id, nearest_values[lane], static_cast<std::uint16_t>(k + lane),
+                   static_cast<std::uint16_t>(fills_bits >> lane & 1U)};
+        }
       }
     }
+  };
+  if (edge_count == 0) {
+    scan_rows(std::integral_constant<std::size_t, 0>());
+  } else if (edge_count == 1) {
+    scan_rows(std::integral_constant<std::size_t, 1>());
+  } else if (edge_count == 2) {
+    scan_rows(std::integral_constant<std::size_t, 2>());
+  } else {
+    scan_rows(std::integral_constant<std::size_t, 3>());
   }
   if (found_count_ > found_before) triangles_.push_back(triangle);
 }

@@ -38,6 +38,7 @@ class CellSurfaces {
     return std::span(sorted_).subspan(begin_[p], begin_[p + 1] - begin_[p]);
   }
 
+  std::size_t triangle_count() const { return triangles_.size(); }
   const ScreenTriangle& triangle(std::uint32_t index) const { return triangles_[index]; }
 
  private:

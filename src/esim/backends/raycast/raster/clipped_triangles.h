@@ -1,12 +1,32 @@
 #pragma once
 
 #include <array>
+#include <cmath>
 #include <cstddef>
 
 #include "esim/backends/raycast/raster/convex.h"
+#include "esim/backends/raycast/raster/image_cells.h"
+#include "esim/backends/raycast/raster/screen_triangles.h"
 
 // Private to .cpp files: includes hwy/highway.h.
 namespace esim::inline backends::inline raycast {
+
+/// From bearings to positions in a pixel.
+struct PixelFrame {
+  float x, y;                ///< its centre
+  float s_x, s_y, t_x, t_y;  ///< derivatives of the position by the bearing
+
+  PixelFrame(const ImageCell& cell, std::size_t pixel) : x(cell.x[pixel]), y(cell.y[pixel]) {
+    const float dx_du = cell.dx_du[pixel], dx_dv = cell.dx_dv[pixel], dy_du = cell.dy_du[pixel];
+    const float dy_dv = cell.dy_dv[pixel], per_det = 1 / (dx_du * dy_dv - dx_dv * dy_du);
+    s_x = dy_dv * per_det, s_y = -dx_dv * per_det, t_x = -dy_du * per_det, t_y = dx_du * per_det;
+  }
+
+  PixelPoint at(float bearing_x, float bearing_y) const {
+    const float dx = bearing_x - x, dy = bearing_y - y;
+    return {s_x * dx + s_y * dy, t_x * dx + t_y * dy};
+  }
+};
 
 /// Triangles in the coordinates of a pixel (see PixelPoint), and the integrals over their parts in the pixel. Their
 /// corners must be less than about 1000 px away, since positions are rounded to 1e-7 of that.
@@ -17,6 +37,18 @@ struct ClippedTriangles {
 
   alignas(64) std::array<Lanes, 3> s, t;  ///< corners, in either order
   alignas(64) Lanes area, of_s, of_t, of_ss, of_st, of_tt;
+
+  /// False if a corner is too far away, or too near to the camera.
+  bool set(std::size_t lane, const ScreenTriangle& triangle, const PixelFrame& frame) {
+    constexpr float kFar = 500;  // px
+    bool is_near = triangle.nearest <= kMaxInverseDepth;
+    for (std::size_t c = 0; c < 3; ++c) {
+      const PixelPoint corner = frame.at(triangle.corner_x[c], triangle.corner_y[c]);
+      s[c][lane] = corner.s, t[c][lane] = corner.t;
+      is_near = is_near && std::fabs(corner.s) < kFar && std::fabs(corner.t) < kFar;
+    }
+    return is_near;
+  }
 
   Moments moments(std::size_t lane) const {
     return {area[lane], of_s[lane], of_t[lane], of_ss[lane], of_st[lane], of_tt[lane]};

@@ -47,6 +47,10 @@ struct Moments {
 
   static Moments pixel() { return {1, 0, 0, 1.0F / 12, 0, 1.0F / 12}; }
 
+  Moments& operator+=(const Moments& other) {
+    area += other.area, s += other.s, t += other.t, ss += other.ss, st += other.st, tt += other.tt;
+    return *this;
+  }
   Moments& operator-=(const Moments& other) {
     area -= other.area, s -= other.s, t -= other.t, ss -= other.ss, st -= other.st, tt -= other.tt;
     return *this;

@@ -12,58 +12,70 @@
 namespace esim::inline backends::inline raycast {
 namespace {
 
-constexpr float kMaxInverseDepth = 1 / kNearestDepth;
 constexpr float kTouch = 1e-4F;         // px; what overlaps by less touches only
 constexpr float kSameDepth = 2e-6F;     // relative; surfaces at the same depth: the first one is visible
 constexpr std::size_t kMaxPieces = 24;  // of a fragment, or of what is left of a pixel
 constexpr std::size_t kMaxCuts = 5;     // of a piece by a surface
-constexpr float kFarCorner = 500;       // px; a corner farther away is not exact enough
 
 using D = EightFloats;
 constexpr std::size_t kVector = hn::MaxLanes(D());
 
-Fragment fragment_of(std::uint32_t triangle, std::uint16_t pixel, const Moments& sum) {
-  const float s = sum.s / sum.area, t = sum.t / sum.area;
-  return {triangle,
-          pixel,
-          {s, t},
-          {sum.ss / sum.area - s * s, sum.st / sum.area - s * t, sum.tt / sum.area - t * t},
-          sum.area};
-}
-
 }  // namespace
 
 PixelSamples::PixelSamples(int samples_per_pixel) {
-  const std::vector<Eigen::Vector2f> places = sample_places(samples_per_pixel);
+  std::vector<Eigen::Vector2f> places = sample_places(samples_per_pixel);
   count = places.size(), all = ~std::uint64_t{0} >> (kMax - count);
+  // Rows of four blocks
+  constexpr std::size_t kRow = 4 * kBlock;
+  const auto by = [&](std::size_t begin, std::size_t end, Eigen::Index axis) {
+    std::ranges::sort(std::span(places).subspan(begin, std::min(end, count) - begin), {},
+                      [axis](const Eigen::Vector2f& place) { return std::pair(place[axis], place[1 - axis]); });
+  };
+  by(0, count, 1);
+  for (std::size_t row = 0; row < count; row += kRow) by(row, row + kRow, 0);
   for (std::size_t i = 0; i < count; ++i) s[i] = places[i].x(), t[i] = places[i].y();
+  for (std::size_t block = 0; block * kBlock < count; ++block) {
+    const auto extent = [&](const std::array<float, kMax>& of, float& middle, float& half) {
+      const auto [low, high] = std::ranges::minmax(
+          std::span(of).first(count).subspan(block * kBlock).first(std::min(kBlock, count - block * kBlock)));
+      middle = 0.5F * (low + high), half = 0.5F * (high - low);
+    };
+    extent(s, block_s[block], half_s[block]), extent(t, block_t[block], half_t[block]);
+  }
 }
 
-SeenInMiddle Coverage::divide(const CellSurfaces& surfaces, const ImageCell& cell, int pixel,
-                              std::vector<Fragment>& fragments) {
-  const std::span<const Candidate> found = surfaces.at(pixel);
-  if (found.empty()) return {};
-  const auto k = static_cast<std::size_t>(pixel);
-  if (found.size() == 1 && found[0].fills_pixel != 0) {
-    const ScreenTriangle& triangle = surfaces.triangle(found[0].triangle);
-    fragments.push_back({found[0].triangle, static_cast<std::uint16_t>(pixel), {0, 0}, {}, 1, samples_.shadows.all});
-    return {triangle.inverse_depth().at(cell.x[k], cell.y[k]), triangle.group, found[0].triangle};
+SeenInMiddle Coverage::divide(int pixel, std::vector<Fragment>& fragments) {
+  pixel_ = static_cast<std::uint16_t>(pixel), found_ = surfaces_->at(pixel);
+  if (found_.empty()) return {};
+  if (found_.size() == 1 && found_[0].fills_pixel != 0) {
+    const ScreenTriangle& triangle = surfaces_->triangle(found_[0].triangle);
+    fragments.emplace_back(found_[0].triangle, pixel_).samples = samples_.shadows.all;
+    return {triangle.inverse_depth().at(cell_->x[pixel_], cell_->y[pixel_]), triangle.group, found_[0].triangle};
   }
-  surfaces_ = &surfaces, cell_ = &cell, pixel_ = static_cast<std::uint16_t>(pixel), found_ = found;
+  candidates_.take(*surfaces_, *cell_, pixel_, found_);
+  const SeenInMiddle seen = look_at_middle();
+  if (dense_.count == 1) {
+    if (seen.inverse_depth > 0) fragments.emplace_back(seen.triangle, pixel_).samples = samples_.shadows.all;
+    return seen;
+  }
+  // The light on a surface may have edges, which need all of its triangles.
+  if (!for_shadows_ && sheets_.divide(pixel_, candidates_.all(), fragments)) return seen;
   put_in_order();
   const std::size_t before = fragments.size();
-  if (dense_.count == 1 || order_.size() > kMaxExact || !divide_exactly(fragments)) {
+  if (order_.size() > kMaxExact || !divide_exactly(fragments)) {
     fragments.resize(before);
     divide_by_samples(fragments);
   }
-  if (for_shadows_) store_samples(std::span(fragments).subspan(before));
-  return look_at_middle();
+  if (for_shadows_) {
+    store_samples(std::span(fragments).subspan(before));
+  } else {
+    sheets_.join(fragments, before);
+  }
+  return seen;
 }
 
 /// The nearest one first.
 void Coverage::put_in_order() {
-  candidates_.clear();
-  candidates_.reserve(found_.size());  // so that references to its elements remain valid
   order_.clear();
   for (std::size_t i = 0; i < found_.size(); ++i) {
     // Positive numbers have the order of their bits.
@@ -76,42 +88,14 @@ float Coverage::nearest(std::size_t candidate) const {
   return std::bit_cast<float>(static_cast<std::uint32_t>(order_[candidate] >> 32));
 }
 
-/// The candidate of that place in the order. Only those that are needed are transformed.
-const Coverage::Local& Coverage::local(std::size_t candidate) {
-  for (std::size_t i = candidates_.size(); i <= candidate; ++i) {
-    const ScreenTriangle& triangle = surfaces_->triangle(found(i).triangle);
-    const std::size_t k = pixel_;
-    Local& local = candidates_.emplace_back();
-    const hn::FixedTag<float, 4> d;
-    const auto x = hn::Load(d, triangle.x.data()), y = hn::Load(d, triangle.y.data());
-    const auto along = [&](float dx, float dy) { return hn::MulAdd(x, hn::Set(d, dx), hn::Mul(y, hn::Set(d, dy))); };
-    const auto middle = hn::Add(along(cell_->x[k], cell_->y[k]), hn::Load(d, triangle.one.data()));
-    const auto s = along(cell_->dx_du[k], cell_->dy_du[k]), t = along(cell_->dx_dv[k], cell_->dy_dv[k]);
-    const auto reach = hn::Mul(hn::Set(d, 0.5F), hn::Add(hn::Abs(s), hn::Abs(t)));
-    hn::Store(middle, d, local.middle.data()), hn::Store(s, d, local.s.data());
-    hn::Store(t, d, local.t.data()), hn::Store(reach, d, local.reach.data());
-    local.nearest = std::min(local.middle[3] + local.reach[3], triangle.nearest);
-    local.farthest = std::max(local.middle[3] - local.reach[3], triangle.farthest);
-    local.triangle = found(i).triangle, local.group = triangle.group, local.index = triangle.index;
-    constexpr unsigned kEdges = 7;  // without the inverse depth
-    std::array<std::uint8_t, 8> crossing{}, outside{};
-    hn::StoreMaskBits(d, hn::Lt(middle, reach), crossing.data());
-    hn::StoreMaskBits(d, hn::Lt(middle, hn::Neg(reach)), outside.data());
-    local.crossing = crossing[0] & kEdges, local.outside = (outside[0] & kEdges) != 0;
-  }
-  return candidates_[candidate];
-}
-
-SeenInMiddle Coverage::look_at_middle() {
+SeenInMiddle Coverage::look_at_middle() const {
   SeenInMiddle seen;
   std::uint32_t index = ~0U;
-  for (std::size_t i = 0; i < order_.size() && nearest(i) >= seen.inverse_depth; ++i) {
-    const Local& local = this->local(i);
-    const float z = local.middle[3];
-    const bool inside = local.middle[0] >= 0 && local.middle[1] >= 0 && local.middle[2] >= 0;
-    if (!inside || !(z > 0) || !(z <= kMaxInverseDepth)) continue;
-    if (z > seen.inverse_depth || (z == seen.inverse_depth && local.index < index))
-      seen = {z, local.group, local.triangle}, index = local.index;
+  for (const PixelTriangle& candidate : candidates_.all()) {
+    const float z = candidate.middle[3];
+    if (!candidate.in_middle || !(z > 0) || !(z <= kMaxInverseDepth)) continue;
+    if (z > seen.inverse_depth || (z == seen.inverse_depth && candidate.index < index))
+      seen = {z, candidate.group, candidate.triangle}, index = candidate.index;
   }
   return seen;
 }
@@ -133,7 +117,7 @@ bool Coverage::divide_exactly(std::vector<Fragment>& fragments) {
       }
       std::swap(left_, remaining_);
     }
-    if (sum.area > kSmallestArea) fragments.push_back(fragment_of(found(i).triangle, pixel_, sum));
+    if (sum.area > kSmallestArea) fragments.push_back(Fragment(found(i).triangle, pixel_, sum));
   }
   return true;
 }
@@ -141,7 +125,7 @@ bool Coverage::divide_exactly(std::vector<Fragment>& fragments) {
 /// Makes visible_ the part of a piece that a surface covers and no other one hides; adds all others to remaining_.
 /// False if that takes too many polygons.
 bool Coverage::take(Convex& piece, std::size_t candidate) {
-  const Local& surface = local(candidate);
+  const PixelTriangle& surface = local(candidate);
   visible_.clear();
   if (is_apart(piece, surface)) {
     remaining_.push_back(piece);
@@ -152,14 +136,14 @@ bool Coverage::take(Convex& piece, std::size_t candidate) {
   visible_.push_back(piece);
   // Surfaces are in the order of their nearest points, so that one after this may be in front of it elsewhere.
   for (std::size_t i = candidate + 1; i < order_.size() && nearest(i) >= surface.farthest; ++i) {
-    const Local& other = local(i);
+    const PixelTriangle& other = local(i);
     if (!other.outside && other.nearest >= surface.farthest && !hide(surface, other)) return false;
   }
   return remaining_.size() <= kMaxPieces;
 }
 
 /// Whether a piece is outside a surface, or touches it only.
-bool Coverage::is_apart(const Convex& piece, const Local& surface) {
+bool Coverage::is_apart(const Convex& piece, const PixelTriangle& surface) {
   if (piece.empty()) return true;
   // Only an edge with a corner outside it may have all of them there.
   const hn::FixedTag<float, 4> d;
@@ -178,7 +162,7 @@ bool Coverage::is_apart(const Convex& piece, const Local& surface) {
 }
 
 /// Cuts a piece down to what a surface covers; adds the others to `rests`. False if it has too many corners.
-bool Coverage::keep_covered(Convex& piece, const Local& surface, std::vector<Convex>& rests) {
+bool Coverage::keep_covered(Convex& piece, const PixelTriangle& surface, std::vector<Convex>& rests) {
   if (!piece.can_be_cut(kMaxCuts)) return false;
   Convex rest;
   const auto cut = [&](const OfPixel& f, float reach) {
@@ -197,7 +181,7 @@ bool Coverage::keep_covered(Convex& piece, const Local& surface, std::vector<Con
 }
 
 /// Moves the parts of visible_ that another surface hides to remaining_. False if too many polygons remain.
-bool Coverage::hide(const Local& surface, const Local& other) {
+bool Coverage::hide(const PixelTriangle& surface, const PixelTriangle& other) {
   const OfPixel z = surface.inverse_depth(), other_z = other.inverse_depth();
   const OfPixel nearer{other_z.middle - z.middle, other_z.s - z.s, other_z.t - z.t};
   const float same = kSameDepth * std::max(surface.nearest, other.nearest);
@@ -222,41 +206,63 @@ bool Coverage::hide(const Local& surface, const Local& other) {
 /// Finds which samples are in each candidate, and which of them see it. Candidates behind all samples are left out.
 void Coverage::look_at(const PixelSamples& samples) {
   const D d;
+  const hn::RebindToSigned<D> di;
   const auto zero = hn::Zero(d), max = hn::Set(d, kMaxInverseDepth);
   alignas(64) std::array<float, PixelSamples::kMax> depth;
-  const std::size_t count = (samples.count + kVector - 1) / kVector * kVector;
-  for (std::size_t i = 0; i < count; i += kVector) hn::Store(zero, d, &depth[i]);
-  covered_.clear(), visible_at_.clear();
+  alignas(64) std::array<std::int32_t, PixelSamples::kMax> seen;  // candidate
+  const std::size_t blocks = (samples.count + PixelSamples::kBlock - 1) / PixelSamples::kBlock;
+  depth.fill(0), seen.fill(-1);
+  covered_.clear();
   float farthest_seen = 0;
   for (std::size_t c = 0; c < order_.size() && nearest(c) >= farthest_seen; ++c) {
-    const Local& local = this->local(c);
-    covered_.push_back(0), visible_at_.push_back(0);
-    if (local.outside) continue;
+    const PixelTriangle& triangle = local(c);
+    covered_.push_back(0);
+    if (triangle.outside) continue;
     const auto of = [&](std::size_t k, auto s, auto t) {
-      return hn::MulAdd(hn::Set(d, local.s[k]), s, hn::MulAdd(hn::Set(d, local.t[k]), t, hn::Set(d, local.middle[k])));
+      const auto along = hn::MulAdd(hn::Set(d, triangle.t[k]), t, hn::Set(d, triangle.middle[k]));
+      return hn::MulAdd(hn::Set(d, triangle.s[k]), s, along);
     };
-    std::uint64_t covered = 0, nearer = 0, equal = 0;
+    unsigned met = 0;  // a bit for each block that may have samples in the triangle
+    for (std::size_t i = 0; i < blocks; i += kVector) {
+      const auto load = [&](const auto& values) { return hn::Load(d, &values[i]); };
+      const auto reach = [&](std::size_t k) {  // slightly more than the function can be
+        const auto size = [&](float by) { return hn::Set(d, 1.001F * std::fabs(by)); };
+        const auto half =
+            hn::MulAdd(size(triangle.s[k]), load(samples.half_s), hn::Mul(size(triangle.t[k]), load(samples.half_t)));
+        return hn::Add(of(k, load(samples.block_s), load(samples.block_t)), half);
+      };
+      met |= bits_of(hn::Ge(hn::Min(hn::Min(reach(0), reach(1)), reach(2)), zero)) << i;
+    }
+    std::uint64_t covered = 0, equal = 0;
+    const auto candidate = hn::Set(di, static_cast<std::int32_t>(c));
+    for (unsigned left = met & ((1U << blocks) - 1); left != 0; left &= left - 1) {
+      const std::size_t first = static_cast<std::size_t>(std::countr_zero(left)) * PixelSamples::kBlock;
+      for (std::size_t i = first; i < first + PixelSamples::kBlock; i += kVector) {
+        const auto s = hn::Load(d, &samples.s[i]), t = hn::Load(d, &samples.t[i]);
+        const auto z = of(3, s, t), before = hn::Load(d, &depth[i]);
+        const auto weight = hn::Min(hn::Min(of(0, s, t), of(1, s, t)), of(2, s, t));
+        const auto inside = hn::And(hn::Ge(weight, zero), hn::And(hn::Gt(z, zero), hn::Le(z, max)));
+        const auto nearer = hn::And(inside, hn::Gt(z, before));
+        hn::Store(hn::IfThenElse(nearer, z, before), d, &depth[i]);
+        hn::Store(hn::IfThenElse(hn::RebindMask(di, nearer), candidate, hn::Load(di, &seen[i])), di, &seen[i]);
+        covered |= std::uint64_t{bits_of(inside)} << i;
+        equal |= std::uint64_t{bits_of(hn::And(inside, hn::Eq(z, before)))} << i;
+      }
+    }
+    covered_[c] = covered & samples.all;
+    for (equal &= samples.all; equal != 0; equal &= equal - 1) {
+      std::int32_t& other = seen[static_cast<std::size_t>(std::countr_zero(equal))];
+      if (triangle.index < local(static_cast<std::size_t>(other)).index) other = static_cast<std::int32_t>(c);
+    }
+    if (covered == 0) continue;
     auto farthest = max;
-    for (std::size_t i = 0; i < count; i += kVector) {
-      const auto s = hn::Load(d, &samples.s[i]), t = hn::Load(d, &samples.t[i]);
-      const auto z = of(3, s, t), before = hn::Load(d, &depth[i]);
-      const auto weight = hn::Min(hn::Min(of(0, s, t), of(1, s, t)), of(2, s, t));
-      const auto inside = hn::And(hn::Ge(weight, zero), hn::And(hn::Gt(z, zero), hn::Le(z, max)));
-      const auto now = hn::IfThenElse(inside, hn::Max(z, before), before);
-      hn::Store(now, d, &depth[i]);
-      farthest = hn::Min(farthest, now);
-      covered |= std::uint64_t{bits_of(inside)} << i;
-      nearer |= std::uint64_t{bits_of(hn::Gt(z, before))} << i;
-      equal |= std::uint64_t{bits_of(hn::Eq(z, before))} << i;
-    }
-    covered &= samples.all;
-    std::uint64_t visible = covered & nearer;
-    for (std::size_t other = 0; other < c; ++other) {
-      if (local.index < candidates_[other].index) visible |= covered & equal & visible_at_[other];
-      visible_at_[other] &= ~visible;
-    }
-    covered_[c] = covered, visible_at_[c] = visible;
+    for (std::size_t i = 0; i < blocks * PixelSamples::kBlock; i += kVector)
+      farthest = hn::Min(farthest, hn::Load(d, &depth[i]));
     farthest_seen = hn::GetLane(hn::MinOfLanes(d, farthest));
+  }
+  visible_at_.assign(covered_.size(), 0);
+  for (std::size_t i = 0; i < samples.count; ++i) {
+    if (seen[i] >= 0) visible_at_[static_cast<std::size_t>(seen[i])] |= std::uint64_t{1} << i;
   }
 }
 
@@ -270,7 +276,7 @@ void Coverage::divide_by_samples(std::vector<Fragment>& fragments) {
   for (std::uint32_t c = 0; c < covered_.size(); ++c) {
     const std::uint64_t visible_at = visible_at_[c];
     if (visible_at == 0) continue;
-    const bool whole = visible_at == covered_[c] && dense_.count > 1;
+    const bool whole = visible_at == covered_[c];
     parts_.push_back({c, visible_at, whole, {}});
     background &= ~visible_at;
     if (whole) others &= ~visible_at;
@@ -296,7 +302,7 @@ void Coverage::divide_by_samples(std::vector<Fragment>& fragments) {
       sum = moments_of_samples(part.visible_at);
       sum.scale(left.area * static_cast<float>(dense_.count) / static_cast<float>(std::popcount(others)));
     }
-    if (sum.area > kSmallestArea) fragments.push_back(fragment_of(found(part.candidate).triangle, pixel_, sum));
+    if (sum.area > kSmallestArea) fragments.push_back(Fragment(found(part.candidate).triangle, pixel_, sum));
   }
 }
 
@@ -305,21 +311,15 @@ void Coverage::divide_by_samples(std::vector<Fragment>& fragments) {
 void Coverage::add_neighbours() {
   std::size_t kept = parts_.size();
   for (std::uint32_t c = 0; c < covered_.size(); ++c) {
-    if (covered_[c] == 0 && !candidates_[c].outside) parts_.push_back({c, 0, true, {}});
+    if (covered_[c] == 0 && !local(c).outside) parts_.push_back({c, 0, true, {}});
   }
   clip_whole_parts(kept);
-  const auto triangle = [&](const Part& part) -> const ScreenTriangle& {
-    return surfaces_->triangle(found(part.candidate).triangle);
-  };
-  for (std::size_t kept_before = 0; kept_before != kept;) {
-    kept_before = kept;
+  for (std::size_t next = 0; next < kept; ++next) {
+    if (!parts_[next].whole) continue;
     for (std::size_t i = kept; i < parts_.size(); ++i) {
-      const auto continues = [&](const Part& part) {
-        return part.whole && triangle(part).is_neighbour(triangle(parts_[i]));
-      };
-      const bool is_visible =
-          parts_[i].moments.area > kSmallestArea && std::ranges::any_of(std::span(parts_).first(kept), continues);
-      if (is_visible) std::swap(parts_[i], parts_[kept++]);
+      if (parts_[i].moments.area <= kSmallestArea) continue;
+      if (sheets_.continues(local(parts_[next].candidate).triangle, local(parts_[i].candidate).triangle))
+        std::swap(parts_[i], parts_[kept++]);
     }
   }
   parts_.resize(kept);
@@ -339,11 +339,7 @@ Moments Coverage::moments_of_samples(std::uint64_t samples) const {
 
 /// Computes the moments of the whole parts, from the `first` part on.
 void Coverage::clip_whole_parts(std::size_t first) {
-  const std::size_t k = pixel_;
-  const float x = cell_->x[k], y = cell_->y[k];
-  const float per_det = 1 / (cell_->dx_du[k] * cell_->dy_dv[k] - cell_->dx_dv[k] * cell_->dy_du[k]);
-  const float s_x = cell_->dy_dv[k] * per_det, s_y = -cell_->dx_dv[k] * per_det;
-  const float t_x = -cell_->dy_du[k] * per_det, t_y = cell_->dx_du[k] * per_det;
+  const PixelFrame frame(*cell_, pixel_);
   std::array<Part*, ClippedTriangles::kCount> lanes;
   std::size_t used = 0;
   const auto flush = [&] {
@@ -353,15 +349,7 @@ void Coverage::clip_whole_parts(std::size_t first) {
   };
   for (Part& part : std::span(parts_).subspan(first)) {
     if (!part.whole) continue;
-    const ScreenTriangle& triangle = surfaces_->triangle(found(part.candidate).triangle);
-    float farthest = triangle.nearest <= kMaxInverseDepth ? 0 : std::numeric_limits<float>::infinity();
-    for (std::size_t c = 0; c < 3; ++c) {
-      const float dx = triangle.corner_x[c] - x, dy = triangle.corner_y[c] - y;
-      const float s = s_x * dx + s_y * dy, t = t_x * dx + t_y * dy;
-      clipped_.s[c][used] = s, clipped_.t[c][used] = t;
-      farthest = std::max(farthest, std::max(std::fabs(s), std::fabs(t)));
-    }
-    if (!(farthest < kFarCorner)) {
+    if (!clipped_.set(used, surfaces_->triangle(found(part.candidate).triangle), frame)) {
       Convex piece = Convex::pixel();
       remaining_.clear();
       keep_covered(piece, local(part.candidate), remaining_);

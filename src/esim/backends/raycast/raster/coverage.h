@@ -9,34 +9,10 @@
 #include "esim/backends/raycast/raster/cell_surfaces.h"
 #include "esim/backends/raycast/raster/clipped_triangles.h"
 #include "esim/backends/raycast/raster/convex.h"
+#include "esim/backends/raycast/raster/sheets.h"
 
 // Private to backends/raycast.
 namespace esim::inline backends::inline raycast {
-
-/// Smaller parts of a pixel are ignored.
-inline constexpr float kSmallestArea = 2e-5F;
-
-/// Variances and covariance of the positions in an area. The defaults are those of a complete pixel.
-struct Spread {
-  float ss = 1.0F / 12, st = 0, tt = 1.0F / 12;
-};
-
-/// The visible part of a triangle in a pixel.
-struct Fragment {
-  std::uint32_t triangle;  ///< of the cell's
-  std::uint16_t pixel;     ///< of the cell
-  PixelPoint centroid;
-  Spread spread;
-  float area;               ///< fraction of the pixel
-  std::uint64_t samples{};  ///< a bit for each sample for shadows at which it is visible, if requested
-};
-
-/// What is seen in the middle of a pixel.
-struct SeenInMiddle {
-  float inverse_depth = 0;  ///< 0: nothing
-  std::uint32_t group = 0;
-  std::uint32_t triangle = 0;  ///< of the cell's
-};
 
 /// Positions in a pixel.
 struct PixelSamples {
@@ -50,6 +26,10 @@ struct PixelSamples {
   std::size_t count;
   std::uint64_t all;  ///< a bit for each of them
   alignas(64) std::array<float, kMax> s{}, t{};
+
+  /// Neighbouring samples follow each other: these are the middles and half the sides of rectangles around kBlock each.
+  static constexpr std::size_t kBlock = 8;
+  alignas(64) std::array<float, kMax / kBlock> block_s{}, block_t{}, half_s{}, half_t{};
 };
 
 /// The samples of Coverage.
@@ -68,29 +48,22 @@ class Coverage {
   /// If there are more triangles, samples tell which of them are visible.
   static constexpr std::size_t kMaxExact = 8;
 
-  /// `for_shadows`: fragments contain the samples for shadows.
-  Coverage(const CoverageSamples& samples, bool for_shadows)
-      : samples_(samples), dense_(samples.visibility), for_shadows_(for_shadows) {}
+  /// `for_shadows`: fragments contain the samples for shadows. All arguments must outlive it.
+  Coverage(const CoverageSamples& samples, const SceneTriangles& triangles, bool for_shadows)
+      : samples_(samples), dense_(samples.visibility), for_shadows_(for_shadows), sheets_(triangles) {}
 
-  /// Appends the fragments of a pixel. The sum of their areas is 1 if no background is visible. If there are many
-  /// candidates, parts below 1/64 of the pixel may be missed; areas are exact for surfaces of which nothing is hidden,
-  /// and for a single one behind them, and multiples of 1/64 for others.
-  SeenInMiddle divide(const CellSurfaces& surfaces, const ImageCell& cell, int pixel, std::vector<Fragment>& fragments);
+  /// Begins with a cell, which must remain as it is.
+  void begin(const CellSurfaces& surfaces, const ImageCell& cell) {
+    surfaces_ = &surfaces, cell_ = &cell;
+    sheets_.begin(surfaces, cell);
+  }
+
+  /// Appends the fragments of a pixel of the cell. The sum of their areas is 1 if no background is visible. If there
+  /// are many candidates, parts below 1/64 of the pixel may be missed; areas are exact for surfaces of which nothing is
+  /// hidden, and for a single one behind them, and multiples of 1/64 for others.
+  SeenInMiddle divide(int pixel, std::vector<Fragment>& fragments);
 
  private:
-  /// A candidate in the pixel's coordinates.
-  struct Local {
-    // Its weights and its inverse depth as functions of the position, and half of the ranges of their values.
-    alignas(16) std::array<float, 4> middle, s, t, reach;
-    float nearest, farthest;  // bounds of the inverse depth in the pixel
-    bool outside;             // of the pixel
-    unsigned crossing;        // a bit for each weight that is not positive in the whole pixel
-    std::uint32_t triangle, group, index;
-
-    OfPixel function(std::size_t k) const { return {middle[k], s[k], t[k]}; }
-    OfPixel inverse_depth() const { return function(3); }
-  };
-
   /// What samples see of a candidate.
   struct Part {
     std::uint32_t candidate;
@@ -99,16 +72,17 @@ class Coverage {
     Moments moments;           // of what it covers, if it is whole
   };
 
+  // The candidate of that place in the order.
   const Candidate& found(std::size_t candidate) const { return found_[order_[candidate] & 0xffffffffU]; }
+  const PixelTriangle& local(std::size_t candidate) const { return candidates_[order_[candidate] & 0xffffffffU]; }
   float nearest(std::size_t candidate) const;
-  const Local& local(std::size_t candidate);
   void put_in_order();
-  SeenInMiddle look_at_middle();
+  SeenInMiddle look_at_middle() const;
   bool divide_exactly(std::vector<Fragment>& fragments);
   bool take(Convex& piece, std::size_t candidate);
-  static bool is_apart(const Convex& piece, const Local& surface);
-  static bool keep_covered(Convex& piece, const Local& surface, std::vector<Convex>& rests);
-  bool hide(const Local& surface, const Local& other);
+  static bool is_apart(const Convex& piece, const PixelTriangle& surface);
+  static bool keep_covered(Convex& piece, const PixelTriangle& surface, std::vector<Convex>& rests);
+  bool hide(const PixelTriangle& surface, const PixelTriangle& other);
   void look_at(const PixelSamples& samples);
   void divide_by_samples(std::vector<Fragment>& fragments);
   void clip_whole_parts(std::size_t first);
@@ -119,13 +93,14 @@ class Coverage {
   const CoverageSamples& samples_;
   const PixelSamples& dense_;
   bool for_shadows_;
+  Sheets sheets_;
+  const CellSurfaces* surfaces_ = nullptr;
+  const ImageCell* cell_ = nullptr;
   // Of the current pixel.
-  const CellSurfaces* surfaces_;
-  const ImageCell* cell_;
   std::uint16_t pixel_;
   std::span<const Candidate> found_;
+  PixelTriangles candidates_;
   std::vector<std::uint64_t> order_;                 // the nearest first: inverse depth, and the place in found_
-  std::vector<Local> candidates_;                    // the first of these
   std::vector<std::uint64_t> covered_, visible_at_;  // samples in each of these, and samples that see it
   std::vector<Part> parts_;
   ClippedTriangles clipped_;

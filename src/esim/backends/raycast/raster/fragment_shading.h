@@ -72,6 +72,10 @@ class FragmentShading {
     rays.first_material = mosaic ? work.first_material.data() : nullptr;
     rays.hits = static_cast<std::uint32_t>((std::uint64_t{1} << fragments.size()) - 1);
     auto& hit = rays.packet.ray.hit;
+    alignas(64) std::array<std::array<float, 4>, K> at;  // the weights, and the inverse depth
+    alignas(64) std::array<float, K> dx_ds, dx_dt, dy_ds, dy_dt, ss, st, tt;
+    const hn::FixedTag<float, 4> d;
+    const float per_side = 1 / side_;
     for (std::size_t i = 0; i < K; ++i) {
       const Fragment& fragment = fragments[std::min(i, fragments.size() - 1)];
       const ScreenTriangle& triangle = surfaces.triangle(fragment.triangle);
@@ -80,21 +84,27 @@ class FragmentShading {
       const float x = cell.x[k] + cell.dx_du[k] * s + cell.dx_dv[k] * t;
       const float y = cell.y[k] + cell.dy_du[k] * s + cell.dy_dv[k] * t;
       rays.packet.bearing_x[i] = x, rays.packet.bearing_y[i] = y;
-      rays.packet.ray.ray.tfar[i] = 1 / triangle.inverse_depth().at(x, y);
-      const auto [b1, b2] = triangle.barycentric(x, y);
-      hit.u[i] = b1, hit.v[i] = b2;
+      const auto of_y = hn::MulAdd(hn::Load(d, triangle.y.data()), hn::Set(d, y), hn::Load(d, triangle.one.data()));
+      hn::Store(hn::MulAdd(hn::Load(d, triangle.x.data()), hn::Set(d, x), of_y), d, at[i].data());
       hit.Ng_x[i] = triangle.normal[0], hit.Ng_y[i] = triangle.normal[1], hit.Ng_z[i] = triangle.normal[2];
       hit.instID[0][i] = triangle.group;
       rays.triangle[i] = triangle.index;
-      const Footprint print = footprint(fragment.spread);
-      const float dx_ds = cell.dx_du[k] / side_, dx_dt = cell.dx_dv[k] / side_;
-      const float dy_ds = cell.dy_du[k] / side_, dy_dt = cell.dy_dv[k] / side_;
-      work.block.dx_du[i] = print.u_s * dx_ds + print.u_t * dx_dt, work.block.dx_dv[i] = print.v_t * dx_dt;
-      work.block.dy_du[i] = print.u_s * dy_ds + print.u_t * dy_dt, work.block.dy_dv[i] = print.v_t * dy_dt;
+      dx_ds[i] = cell.dx_du[k], dx_dt[i] = cell.dx_dv[k], dy_ds[i] = cell.dy_du[k], dy_dt[i] = cell.dy_dv[k];
+      ss[i] = fragment.spread.ss, st[i] = fragment.spread.st, tt[i] = fragment.spread.tt;
       if (mosaic) {
         const int column = fragment.pixel % ImageCell::kWidth, row = fragment.pixel / ImageCell::kWidth;
         work.first_material[i] = scene_.first_material(colour_at(column, row));
       }
+    }
+#pragma omp simd
+    for (std::size_t i = 0; i < K; ++i) {
+      const float sum = at[i][0] + at[i][1] + at[i][2], per_sum = sum > 0 ? 1 / sum : 0.0F;
+      hit.u[i] = at[i][1] * per_sum, hit.v[i] = at[i][2] * per_sum;
+      rays.packet.ray.ray.tfar[i] = 1 / at[i][3];
+      const Footprint print = footprint(ss[i], st[i], tt[i]);
+      const float u_s = per_side * print.u_s, u_t = per_side * print.u_t, v_t = per_side * print.v_t;
+      work.block.dx_du[i] = u_s * dx_ds[i] + u_t * dx_dt[i], work.block.dx_dv[i] = v_t * dx_dt[i];
+      work.block.dy_du[i] = u_s * dy_ds[i] + u_t * dy_dt[i], work.block.dy_dv[i] = v_t * dy_dt[i];
     }
     for (const std::uint32_t index : rays.triangle) moment_.triangles->prefetch(index);
   }
@@ -108,11 +118,11 @@ class FragmentShading {
   /// The parallelogram whose positions vary like those of the fragment, and in addition by what the footprint of a
   /// complete pixel exceeds the square that edges are averaged over: all fragments of a pixel together are as sharp as
   /// a pixel without edges, and each sees little of the texture beside what it covers.
-  Footprint footprint(const Spread& spread) const {
+  Footprint footprint(float spread_ss, float spread_st, float spread_tt) const {
     constexpr float kSquare = 12, kSmallest = 1e-6F;
     const float of_edges = side_ * side_, others = 1 - of_edges;
-    const float ss = std::max(others + of_edges * kSquare * spread.ss, kSmallest), st = of_edges * kSquare * spread.st;
-    const float tt = others + of_edges * kSquare * spread.tt;
+    const float ss = std::max(others + of_edges * kSquare * spread_ss, kSmallest), st = of_edges * kSquare * spread_st;
+    const float tt = others + of_edges * kSquare * spread_tt;
     const float u_s = std::sqrt(ss), u_t = st / u_s;
     return {u_s, u_t, std::sqrt(std::max(tt - u_t * u_t, kSmallest))};
   }

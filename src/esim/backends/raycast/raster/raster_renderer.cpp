@@ -83,7 +83,7 @@ class RasterRenderer final : public ProcessorRenderer {
     constexpr int kWidth = ImageCell::kWidth, kHeight = ImageCell::kHeight;
     CellSurfaces surfaces;
     const bool shadows = moment.lighting && moment.lighting->shadows;
-    Coverage coverage(samples_, shadows);
+    Coverage coverage(samples_, *moment.triangles, shadows);
     FragmentShading<K> shading(*scene_, moment, side_, samples_.shadows);
     std::vector<Fragment> fragments;
     for (int top = band.y / kHeight * kHeight; top < band.y + band.height; top += kHeight) {
@@ -92,10 +92,11 @@ class RasterRenderer final : public ProcessorRenderer {
         const CellPart part{{std::max(band.x - left, 0), std::min(band.x + band.width - left, kWidth) - 1},
                             {std::max(band.y - top, 0), std::min(band.y + band.height - top, kHeight) - 1}};
         surfaces.collect(moment.groups, cell, part);
+        coverage.begin(surfaces, cell);
         fragments.clear();
         for (int row = part.rows.first; row <= part.rows.last; ++row) {
           for (int column = part.columns.first; column <= part.columns.last; ++column) {
-            const SeenInMiddle seen = coverage.divide(surfaces, cell, row * kWidth + column, fragments);
+            const SeenInMiddle seen = coverage.divide(row * kWidth + column, fragments);
             sample.depth(left + column, top + row) = seen.inverse_depth > 0 ? 1 / seen.inverse_depth : kInfinity;
             if (!sample.object.empty())
               sample.object(left + column, top + row) = static_cast<std::uint16_t>(seen.group);

@@ -12,6 +12,7 @@ namespace esim::inline backends::inline raycast {
 
 /// Closer surfaces are invisible; m.
 inline constexpr float kNearestDepth = 1e-3F;
+inline constexpr float kMaxInverseDepth = 1 / kNearestDepth;
 
 /// A linear function of the bearing (x, y, 1).
 struct OfBearing {
@@ -33,30 +34,10 @@ struct ScreenTriangle {
   std::uint32_t group;                      ///< of the scene
   std::uint32_t index;                      ///< in the scene
 
-  /// Whether both have a side in common, and lie on different sides of it in the image.
-  bool is_neighbour(const ScreenTriangle& other) const {
-    if (group != other.group) return false;
-    for (std::size_t k = 0; k < 3; ++k) {
-      // The side opposite corner k, in both directions.
-      const std::size_t a = (k + 1) % 3, b = (k + 2) % 3;
-      for (std::size_t l = 0; l < 3; ++l) {
-        const std::size_t c = (l + 1) % 3, d = (l + 2) % 3;
-        if ((has_corner(a, other, c) && has_corner(b, other, d)) ||
-            (has_corner(a, other, d) && has_corner(b, other, c)))
-          return (side(a, b, *this, k) < 0) != (side(a, b, other, l) < 0);
-      }
-    }
-    return false;
-  }
+  /// Whether a corner is that of another triangle.
   bool has_corner(std::size_t k, const ScreenTriangle& other, std::size_t corner) const {
     return corner_x[k] == other.corner_x[corner] && corner_y[k] == other.corner_y[corner];
   }
-  /// On which side of the line from corner a to corner b a corner is.
-  float side(std::size_t a, std::size_t b, const ScreenTriangle& other, std::size_t corner) const {
-    const float dx = other.corner_x[corner] - corner_x[a], dy = other.corner_y[corner] - corner_y[a];
-    return (corner_x[b] - corner_x[a]) * dy - (corner_y[b] - corner_y[a]) * dx;
-  }
-
   OfBearing weight(std::size_t k) const { return {x[k], y[k], one[k]}; }
   OfBearing inverse_depth() const { return {x[3], y[3], one[3]}; }
 

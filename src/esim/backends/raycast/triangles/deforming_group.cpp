@@ -21,6 +21,7 @@ DeformingGroup::DeformingGroup(const SceneObject& object, const TriangleUse& use
       first_vertices_(object.mesh.vertices) {
   shading_.reserve(corners_.size());
   for (std::size_t i = 0; i < corners_.size(); ++i) shading_.emplace_back(object.mesh, i, first_material);
+  if (use_.surfaces) connect(object.mesh, use_.normals, shading_);
   if (use_.wants_tree(corners_.size())) plant_trees();
 }
 

@@ -3,12 +3,37 @@
 #include <tbb/task_arena.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
+#include <bit>
 #include <cstring>
+#include <numeric>
 #include <string>
+#include <utility>
 
 #include "esim/core/error.h"
 
 namespace esim::inline backends::inline raycast {
+
+namespace {
+
+/// For each vertex, the first one in order that is at the same position.
+std::vector<std::uint32_t> places_of(const std::vector<Eigen::Vector3f>& vertices) {
+  const auto bits = [&](std::uint32_t i) {
+    const auto of = [](float v) { return std::bit_cast<std::uint32_t>(v + 0.0F); };  // without minus zero
+    return std::array{of(vertices[i].x()), of(vertices[i].y()), of(vertices[i].z())};
+  };
+  std::vector<std::uint32_t> order(vertices.size());
+  std::iota(order.begin(), order.end(), 0U);
+  std::ranges::sort(order, {}, [&](std::uint32_t i) { return std::pair(bits(i), i); });
+  std::vector<std::uint32_t> places(vertices.size());
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const bool is_same = i > 0 && bits(order[i]) == bits(order[i - 1]);
+    places[order[i]] = is_same ? places[order[i - 1]] : order[i];
+  }
+  return places;
+}
+
+}  // namespace
 
 TriangleShading::TriangleShading(const Mesh& mesh, std::size_t index, std::uint32_t first_material)
     : material(first_material + mesh.material[index]) {
@@ -28,6 +53,55 @@ void TriangleShading::place(const Eigen::Vector3f& p0, const Eigen::Vector3f& p1
   const Eigen::Vector3d dual1 = per_area2 * e2.cross(normal), dual2 = per_area2 * normal.cross(e1);
   Eigen::Map<Eigen::Vector3f>{gradient_u} = (u1 * dual1 + u2 * dual2).cast<float>();
   Eigen::Map<Eigen::Vector3f>{gradient_v} = (v1 * dual1 + v2 * dual2).cast<float>();
+}
+
+void connect(const Mesh& mesh, bool lit, std::span<TriangleShading> triangles) {
+  const std::vector<std::uint32_t> places = places_of(mesh.vertices);
+  // The sides by the end of the lower number.
+  struct Side {
+    std::uint32_t other, triangle, corner;  // the other end; the corner opposite the side
+  };
+  const auto for_each_side = [&](const auto& visit) {
+    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+      for (std::uint32_t k = 0; k < 3; ++k) {
+        const std::uint32_t a = places[mesh.triangles[i][(k + 1) % 3]], b = places[mesh.triangles[i][(k + 2) % 3]];
+        visit(std::min(a, b), Side{std::max(a, b), i, k});
+      }
+    }
+  };
+  std::vector<std::size_t> begin(mesh.vertices.size() + 2);
+  for_each_side([&](std::uint32_t end, const Side&) { ++begin[end + 2]; });
+  for (std::size_t i = 2; i < begin.size(); ++i) begin[i] += begin[i - 1];
+  std::vector<Side> sides(3 * mesh.triangles.size());
+  for_each_side([&](std::uint32_t end, const Side& side) { sides[begin[end + 1]++] = side; });
+
+  const auto continues = [&](const Side& one, const Side& two) {
+    const auto &here = mesh.triangles[one.triangle], &there = mesh.triangles[two.triangle];
+    if (mesh.material[one.triangle] != mesh.material[two.triangle]) return false;
+    const bool needs_normals = lit && !mesh.materials[mesh.material[one.triangle]].unlit;
+    for (const std::uint32_t k : {(one.corner + 1) % 3, (one.corner + 2) % 3}) {
+      const std::uint32_t next = (two.corner + 1) % 3, last = (two.corner + 2) % 3;
+      const std::uint32_t l = places[there[next]] == places[here[k]] ? next : last;
+      if (mesh.texture_uv[one.triangle][k] != mesh.texture_uv[two.triangle][l]) return false;
+      if (!needs_normals) continue;
+      if (mesh.normals.empty() || mesh.normals[here[k]].isZero()) return false;
+      if (mesh.normals[here[k]] != mesh.normals[there[l]]) return false;
+    }
+    return true;
+  };
+  for (std::uint32_t end = 0; end < mesh.vertices.size(); ++end) {
+    const std::span<Side> of_end = std::span(sides).subspan(begin[end], begin[end + 1] - begin[end]);
+    std::ranges::sort(of_end, {}, [](const Side& side) { return std::pair(side.other, side.triangle); });
+    for (std::size_t i = 0, next = 0; i < of_end.size(); i = next) {
+      while (next < of_end.size() && of_end[next].other == of_end[i].other) ++next;
+      const Side &one = of_end[i], &two = of_end[next - 1];
+      if (next - i != 2 || one.other == end || one.triangle == two.triangle) continue;
+      const auto apart = static_cast<std::int32_t>(two.triangle - one.triangle);
+      const bool same = continues(one, two);
+      triangles[one.triangle].next[one.corner] = {apart, same};
+      triangles[two.triangle].next[two.corner] = {-apart, same};
+    }
+  }
 }
 
 void throw_on_error(RTCDevice device, const char* what) {

@@ -28,6 +28,9 @@ class SceneTriangles {
 
   std::uint32_t material(std::uint32_t index) const { return stored(index).material; }
 
+  /// The triangle beyond the side opposite a corner.
+  NextTriangle next(std::uint32_t index, std::size_t corner) const { return stored(index).next[corner]; }
+
   void prefetch(std::uint32_t index) const { __builtin_prefetch(&stored(index)); }
 
   /// The normals at a triangle's corners; of length 0 if it is flat.

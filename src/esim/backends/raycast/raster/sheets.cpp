@@ -11,7 +11,7 @@
 namespace esim::inline backends::inline raycast {
 namespace {
 
-constexpr float kFlat = 0.25F;     // in sides of a pixel: how far one surface may be from the plane of a triangle in it
+constexpr float kFlat = 0.05F;     // in sides of a pixel: how far one surface may be from the plane of a triangle in it
 constexpr float kOverlap = 1e-3F;  // of a sheet with itself, as an area
 constexpr float kRounding = 2e-6F;  // of bearings
 constexpr std::uint8_t kNoSheet = 0, kOutside = 255;

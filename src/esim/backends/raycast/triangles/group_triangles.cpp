@@ -57,24 +57,9 @@ void TriangleShading::place(const Eigen::Vector3f& p0, const Eigen::Vector3f& p1
 
 void connect(const Mesh& mesh, bool lit, std::span<TriangleShading> triangles) {
   const std::vector<std::uint32_t> places = places_of(mesh.vertices);
-  // The sides by the end of the lower number.
   struct Side {
-    std::uint32_t other, triangle, corner;  // the other end; the corner opposite the side
+    std::uint32_t other, triangle, corner;  // its end of the higher number; the corner opposite the side
   };
-  const auto for_each_side = [&](const auto& visit) {
-    for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
-      for (std::uint32_t k = 0; k < 3; ++k) {
-        const std::uint32_t a = places[mesh.triangles[i][(k + 1) % 3]], b = places[mesh.triangles[i][(k + 2) % 3]];
-        visit(std::min(a, b), Side{std::max(a, b), i, k});
-      }
-    }
-  };
-  std::vector<std::size_t> begin(mesh.vertices.size() + 2);
-  for_each_side([&](std::uint32_t end, const Side&) { ++begin[end + 2]; });
-  for (std::size_t i = 2; i < begin.size(); ++i) begin[i] += begin[i - 1];
-  std::vector<Side> sides(3 * mesh.triangles.size());
-  for_each_side([&](std::uint32_t end, const Side& side) { sides[begin[end + 1]++] = side; });
-
   const auto continues = [&](const Side& one, const Side& two) {
     const auto &here = mesh.triangles[one.triangle], &there = mesh.triangles[two.triangle];
     if (mesh.material[one.triangle] != mesh.material[two.triangle]) return false;
@@ -89,8 +74,7 @@ void connect(const Mesh& mesh, bool lit, std::span<TriangleShading> triangles) {
     }
     return true;
   };
-  for (std::uint32_t end = 0; end < mesh.vertices.size(); ++end) {
-    const std::span<Side> of_end = std::span(sides).subspan(begin[end], begin[end + 1] - begin[end]);
+  const auto connect_sides = [&](std::uint32_t end, std::span<Side> of_end) {
     std::ranges::sort(of_end, {}, [](const Side& side) { return std::pair(side.other, side.triangle); });
     for (std::size_t i = 0, next = 0; i < of_end.size(); i = next) {
       while (next < of_end.size() && of_end[next].other == of_end[i].other) ++next;
@@ -100,6 +84,31 @@ void connect(const Mesh& mesh, bool lit, std::span<TriangleShading> triangles) {
       const bool same = continues(one, two);
       triangles[one.triangle].next[one.corner] = {apart, same};
       triangles[two.triangle].next[two.corner] = {-apart, same};
+    }
+  };
+
+  // Some ends at a time, so that few sides need memory.
+  constexpr std::size_t kTimes = 16;
+  const std::size_t count = (mesh.vertices.size() + kTimes - 1) / kTimes;
+  std::vector<std::uint32_t> begin;  // of the sides of each end of the lower number
+  std::vector<Side> sides;
+  for (std::size_t first = 0; first < mesh.vertices.size(); first += count) {
+    const auto for_each_side = [&](const auto& visit) {
+      for (std::uint32_t i = 0; i < mesh.triangles.size(); ++i) {
+        for (std::uint32_t k = 0; k < 3; ++k) {
+          const std::uint32_t a = places[mesh.triangles[i][(k + 1) % 3]], b = places[mesh.triangles[i][(k + 2) % 3]];
+          if (const std::size_t end = std::min(a, b) - first; end < count) visit(end, Side{std::max(a, b), i, k});
+        }
+      }
+    };
+    begin.assign(count + 2, 0);
+    for_each_side([&](std::size_t end, const Side&) { ++begin[end + 2]; });
+    for (std::size_t i = 2; i < begin.size(); ++i) begin[i] += begin[i - 1];
+    sides.resize(begin.back());
+    for_each_side([&](std::size_t end, const Side& side) { sides[begin[end + 1]++] = side; });
+    for (std::size_t end = 0; end < count; ++end) {
+      connect_sides(static_cast<std::uint32_t>(first + end),
+                    std::span(sides).subspan(begin[end], begin[end + 1] - begin[end]));
     }
   }
 }

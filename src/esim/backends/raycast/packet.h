@@ -4,7 +4,6 @@
 
 #include <array>
 #include <cstdint>
-#include <limits>
 #include <span>
 
 #include "esim/backends/raycast/embree.h"
@@ -12,8 +11,6 @@
 
 // Private to backends/raycast: includes hwy/highway.h.
 namespace esim::inline backends::inline raycast {
-
-inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// A bit for each of K lanes.
 template <int K>

@@ -1,11 +1,14 @@
 #pragma once
 
 #include <algorithm>
+#include <limits>
 #include <vector>
 
 #include "esim/render/pixel_rays.h"
 
 namespace esim::inline backends::inline raycast {
+
+inline constexpr float kInfinity = std::numeric_limits<float>::infinity();
 
 /// A block of 4 x 4 pixels, row-major. Pixels outside the image repeat its last row or column.
 struct RayBlock {

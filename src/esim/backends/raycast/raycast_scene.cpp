@@ -1,7 +1,6 @@
 #include "esim/backends/raycast/raycast_scene.h"
 
 #include <algorithm>
-#include <limits>
 #include <string>
 
 #include "esim/core/error.h"
@@ -22,7 +21,6 @@ Mesh joined(const std::vector<const Mesh*>& meshes) {
 
 /// The bearings under which a box may be visible: all of them, unless it is completely in front of the camera.
 BearingBounds bounds_in_view(const Eigen::AlignedBox3f& box, const SE3& T_group_camera) {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   constexpr float kRounding = 1e-4F;
   BearingBounds bounds{kInfinity, -kInfinity, kInfinity, -kInfinity};
   if (box.isEmpty()) return bounds;

@@ -38,7 +38,6 @@ ImageCells::ImageCells(const PixelRays& rays, float side) {
   for (int top = 0; top < height; top += kHeight) {
     for (int left = 0; left < width; left += kWidth) {
       ImageCell& cell = cells_.emplace_back();
-      constexpr float kInfinity = std::numeric_limits<float>::infinity();
       cell.bounds = {kInfinity, -kInfinity, kInfinity, -kInfinity};
       cell.half_width = cell.half_height = cell.extent = 0;
       for (int i = 0; i < ImageCell::kPixels; ++i) {

@@ -16,7 +16,6 @@ inline double to_unit(double value) {
 }  // namespace
 
 void ScreenLeaf::project(const TriangleTree::Leaf& leaf, const Eigen::Matrix3f& R, const Eigen::Vector3f& camera) {
-  constexpr float kInfinity = std::numeric_limits<float>::infinity();
   constexpr float kRounding = 2e-6F;
   alignas(64) std::array<std::array<Lanes, 3>, 3> p;  // the corners in the camera frame
   const float cx = camera.x(), cy = camera.y(), cz = camera.z();

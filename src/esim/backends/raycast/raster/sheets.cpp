@@ -4,7 +4,6 @@
 #include <bit>
 #include <cmath>
 #include <functional>
-#include <limits>
 #include <numeric>
 #include <utility>
 
@@ -13,7 +12,6 @@ namespace {
 
 constexpr float kFlat = 0.05F;     // in sides of a pixel: how far one surface may be from the plane of a triangle in it
 constexpr float kOverlap = 1e-3F;  // of a sheet with itself, as an area
-constexpr float kRounding = 2e-6F;  // of bearings
 constexpr std::uint8_t kNoSheet = 0, kOutside = 255;
 constexpr std::size_t kMaxFound = 64;  // more triangles in a pixel have more sheets than one
 
@@ -96,7 +94,7 @@ std::uint32_t Sheets::nearest_of_rest() const {
 /// Makes the sheet of a triangle: from each triangle, it continues beyond the sides that meet the pixel.
 void Sheets::grow(std::uint32_t first, Sheet& sheet) {
   sheet.members.assign(1, first), sheet.folds.clear();
-  sheet.farthest = std::numeric_limits<float>::infinity();
+  sheet.farthest = kInfinity;
   sheet.ends = sheet.too_near = false, sheet.continues = true, sheet.middle = kNone;
   sheet.number = sheet_[first] = ++sheet_count_;
   for (std::size_t next = 0; next < sheet.members.size(); ++next) {
@@ -162,6 +160,7 @@ bool Sheets::divide(std::uint16_t pixel, std::span<const PixelTriangle> found, s
   if (slots_.empty()) make_table();
   pixel_ = pixel, found_ = found, sheet_count_ = 0;
   x_ = cell_->x[pixel], y_ = cell_->y[pixel];
+  constexpr float kRounding = 2e-6F;  // of bearings
   const float rounding = kRounding * cell_->extent;
   half_width_ = 0.5F * (std::fabs(cell_->dx_du[pixel]) + std::fabs(cell_->dx_dv[pixel])) + rounding;
   half_height_ = 0.5F * (std::fabs(cell_->dy_du[pixel]) + std::fabs(cell_->dy_dv[pixel])) + rounding;

@@ -21,14 +21,6 @@ struct WideFunction {
   }
 };
 
-/// A bit for each weight of a mask of the weights and the inverse depth.
-template <class Mask>
-unsigned edges_of(Mask mask) {
-  std::uint8_t bits[8] = {};
-  hn::StoreMaskBits(hn::FixedTag<float, 4>(), mask, bits);
-  return bits[0] & 7U;
-}
-
 }  // namespace
 
 void CellSurfaces::collect(const std::vector<PlacedGroup>& groups, const ImageCell& cell, const CellPart& part) {
@@ -77,7 +69,7 @@ void CellSurfaces::scan(const ScreenTriangle& triangle, const BearingBounds& bou
   constexpr float kRounding = 3e-7F;
   const auto error = hn::Mul(hn::Set(d4, kRounding * cell.extent), hn::Max(hn::Max(size_x, size_y), hn::Abs(one4)));
   const auto reach = hn::Add(half_range(cell.half_width, cell.half_height), error);
-  if ((edges_of(hn::Lt(hn::Add(middle, in_cell), hn::Neg(error)))) != 0) return;
+  if (edges_of(hn::Lt(hn::Add(middle, in_cell), hn::Neg(error))) != 0) return;
   // Edges that do not cross the cell need no tests.
   const unsigned crossing = edges_of(hn::Le(hn::Sub(middle, in_cell), reach));
   alignas(16) std::array<float, 4> reaches;
@@ -97,7 +89,7 @@ void CellSurfaces::scan(const ScreenTriangle& triangle, const BearingBounds& bou
   std::size_t edge_count = 0;
   for (unsigned left = crossing; left != 0; left &= left - 1)
     edges[edge_count++] = wide(static_cast<std::size_t>(std::countr_zero(left)));
-  const V zero = hn::Zero(d), max = hn::Set(d, 1 / kNearestDepth);
+  const V zero = hn::Zero(d), max = hn::Set(d, kMaxInverseDepth);
   const V min_depth = hn::Set(d, triangle.farthest), max_depth = hn::Set(d, triangle.nearest);
   const auto id = static_cast<std::uint32_t>(triangles_.size());
   const std::size_t found_before = found_count_;

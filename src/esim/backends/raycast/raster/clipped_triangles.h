@@ -41,7 +41,7 @@ struct ClippedTriangles {
   /// False if a corner is too far away, or too near to the camera.
   bool set(std::size_t lane, const ScreenTriangle& triangle, const PixelFrame& frame) {
     constexpr float kFar = 500;  // px
-    bool is_near = triangle.nearest <= kMaxInverseDepth;
+    bool is_near = triangle.is_in_front();
     for (std::size_t c = 0; c < 3; ++c) {
       const PixelPoint corner = frame.at(triangle.corner_x[c], triangle.corner_y[c]);
       s[c][lane] = corner.s, t[c][lane] = corner.t;

@@ -26,6 +26,14 @@ unsigned bits_of(Mask mask) {
   return bits[0];
 }
 
+/// A bit for each weight of a mask of the weights and the inverse depth.
+template <class Mask>
+unsigned edges_of(Mask mask) {
+  std::uint8_t bits[8] = {};
+  hn::StoreMaskBits(hn::FixedTag<float, 4>(), mask, bits);
+  return bits[0] & 7U;
+}
+
 /// A position in a pixel, from its centre: [-0.5, 0.5] x [-0.5, 0.5].
 struct PixelPoint {
   float s, t;

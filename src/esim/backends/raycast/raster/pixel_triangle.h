@@ -38,12 +38,6 @@ class PixelTriangles {
     const auto bearing_x = hn::Set(d, cell.x[pixel]), bearing_y = hn::Set(d, cell.y[pixel]);
     const auto dx_du = hn::Set(d, cell.dx_du[pixel]), dy_du = hn::Set(d, cell.dy_du[pixel]);
     const auto dx_dv = hn::Set(d, cell.dx_dv[pixel]), dy_dv = hn::Set(d, cell.dy_dv[pixel]);
-    const auto edges = [d](auto mask) {
-      constexpr unsigned kEdges = 7;  // without the inverse depth
-      std::uint8_t bits[8];
-      hn::StoreMaskBits(d, mask, bits);
-      return bits[0] & kEdges;
-    };
     for (std::size_t i = 0; i < count_; ++i) {
       PixelTriangle& to = all_[i];
       const ScreenTriangle& seen = surfaces.triangle(found[i].triangle);
@@ -55,8 +49,8 @@ class PixelTriangles {
       hn::Store(t, d, to.t.data()), hn::Store(reach, d, to.reach.data());
       to.nearest = std::min(to.middle[3] + to.reach[3], seen.nearest);
       to.farthest = std::max(to.middle[3] - to.reach[3], seen.farthest);
-      to.crossing = edges(hn::Lt(middle, reach)), to.outside = edges(hn::Lt(middle, hn::Neg(reach))) != 0;
-      to.in_middle = edges(hn::Ge(middle, hn::Zero(d))) == 7;
+      to.crossing = edges_of(hn::Lt(middle, reach)), to.outside = edges_of(hn::Lt(middle, hn::Neg(reach))) != 0;
+      to.in_middle = edges_of(hn::Ge(middle, hn::Zero(d))) == 7;
       to.triangle = found[i].triangle, to.group = seen.group, to.index = seen.index;
     }
   }

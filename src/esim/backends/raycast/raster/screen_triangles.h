@@ -38,6 +38,9 @@ struct ScreenTriangle {
   bool has_corner(std::size_t k, const ScreenTriangle& other, std::size_t corner) const {
     return corner_x[k] == other.corner_x[corner] && corner_y[k] == other.corner_y[corner];
   }
+  /// Whether no part of it is too close; otherwise, its corners have no bearings.
+  bool is_in_front() const { return nearest <= kMaxInverseDepth; }
+
   OfBearing weight(std::size_t k) const { return {x[k], y[k], one[k]}; }
   OfBearing inverse_depth() const { return {x[3], y[3], one[3]}; }
 

@@ -17,8 +17,6 @@ constexpr std::size_t kMaxFound = 64;  // more triangles in a pixel have more sh
 
 std::size_t hash_of(std::uint32_t index) { return index * 0x9e3779b1U; }
 
-bool is_in_front(const ScreenTriangle& triangle) { return triangle.nearest <= kMaxInverseDepth; }
-
 }  // namespace
 
 void Sheets::make_table() {
@@ -63,7 +61,7 @@ Sheets::Beyond Sheets::look_beyond(const ScreenTriangle& here, std::size_t side)
 
 /// Whether the rectangle around a triangle meets that of the pixel.
 bool Sheets::meets_pixel(const ScreenTriangle& triangle) const {
-  if (!is_in_front(triangle)) return true;
+  if (!triangle.is_in_front()) return true;
   const auto meets = [](const std::array<float, 3>& corner, float at, float half) {
     return std::max({corner[0], corner[1], corner[2]}) >= at - half &&
            std::min({corner[0], corner[1], corner[2]}) <= at + half;
@@ -100,7 +98,7 @@ void Sheets::grow(std::uint32_t first, Sheet& sheet) {
   for (std::size_t next = 0; next < sheet.members.size(); ++next) {
     const PixelTriangle& here = found_[sheet.members[next]];
     const ScreenTriangle& triangle = surfaces_->triangle(here.triangle);
-    sheet.too_near = sheet.too_near || !is_in_front(triangle);
+    sheet.too_near = sheet.too_near || !triangle.is_in_front();
     sheet.farthest = std::min(sheet.farthest, here.farthest);
     if (here.in_middle) sheet.middle = here.triangle;
     for (unsigned left = here.crossing; left != 0; left &= left - 1) {
@@ -288,7 +286,7 @@ void Sheets::join(std::vector<Fragment>& fragments, std::size_t first) {
     const auto begin = fragments.begin() + static_cast<std::ptrdiff_t>(first);
     std::iter_swap(begin, std::ranges::max_element(begin, fragments.end(), {}, &Fragment::area));
     const ScreenTriangle& largest = surfaces_->triangle(begin->triangle);
-    if (!is_in_front(largest)) continue;
+    if (!largest.is_in_front()) continue;
     Moments sum = begin->moments();
     joined_.assign(1, begin->triangle);
     for (std::size_t next = 0; next < joined_.size(); ++next) {

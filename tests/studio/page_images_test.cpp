@@ -90,5 +90,28 @@ TEST(PageImages, WhatCannotBeDecodedIsSaid) {
   EXPECT_THROW(page_image({.name = "empty", .opaque = true}), UserError);
 }
 
+/// One half per colour and pixel, least significant byte first.
+TEST(PageImages, LightKeepsValuesAboveWhite) {
+  const auto half = [](const PageLight& light, std::size_t i) {
+    return static_cast<unsigned char>(light.halves[2 * i]) | static_cast<unsigned char>(light.halves[2 * i + 1]) << 8;
+  };
+  Planes planes(3, Image<float>(4, 2));
+  planes[0](1, 0) = 1, planes[1](1, 0) = 300, planes[2](1, 0) = 1e9F, planes[0](0, 1) = -1;
+  const PageLight light = page_light(planes, 4);
+  ASSERT_EQ(light.halves.size(), 2U * 3 * 8);
+  EXPECT_EQ(half(light, 3), 0x3c00);
+  EXPECT_EQ(half(light, 4), 0x5cb0);
+  EXPECT_EQ(half(light, 5), 0x7bff);  // 65504
+  EXPECT_EQ(half(light, 12), 0);
+
+  Image<float> grey(8, 4);
+  for (float& value : grey.pixels()) value = 2;
+  const PageLight small = page_light({grey}, 4);
+  EXPECT_EQ(small.width, 4);
+  EXPECT_EQ(small.height, 2);
+  ASSERT_EQ(small.halves.size(), 2U * 3 * 8);
+  for (std::size_t i = 0; i < 3 * 8; ++i) EXPECT_EQ(half(small, i), 0x4000);
+}
+
 }  // namespace
 }  // namespace esim::studio

@@ -53,6 +53,11 @@ struct Gloss {
   /// Components of normals, stored as (n + 1) / 2: x towards larger u, y towards smaller v, z outwards. Their mean over
   /// a pixel is shorter than 1 if they differ. All three or none.
   std::array<std::shared_ptr<const Texture>, 3> normal_textures{};
+
+  // For SceneLook::coded, instead of the textures. A roughness is in the green channel, a metallic factor in the blue
+  // one. The x and y of normals are still to be multiplied by the scale.
+  std::shared_ptr<const CodedTexture> coded_roughness{}, coded_metallic{}, coded_normals{};
+  float normal_scale = 1;
 };
 
 /// The appearance of a surface: its base colour, which is radiance if it is unlit and albedo if it is lit (see

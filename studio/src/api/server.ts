@@ -44,6 +44,8 @@ export const view = (source: Source, camera: string, at: { t: number } | { pose:
 
 export const getShapes = (file: string, first: number, count: number) => getBytes(file, { first, count });
 
+export const getLight = (file: string) => getBytes(file, {});
+
 export const startRun = (path: string, out: string | undefined, overwrite: boolean) =>
   sendJson<{ id: string }>("POST", "/api/runs", { path, ...(out ? { out } : {}), overwrite });
 export const runs = () => getJson<RunState[]>("/api/runs");

@@ -85,6 +85,13 @@ export interface ShapeFile {
   end: number;
 }
 
+/** Light of which values above white are kept: R, G and B in half precision, row by row from the top. */
+export interface LightFile {
+  file: string;
+  width: number;
+  height: number;
+}
+
 export interface SceneInfo {
   kind: "mesh" | "splats" | "panorama" | "plane" | "sprites" | "engine";
   glb: string | null;
@@ -96,6 +103,8 @@ export interface SceneInfo {
   middle?: [[number, number, number], [number, number, number]] | null;
   /** Of the rig; look_at of waypoints refers to the first. */
   cameras: [CameraModel, ...CameraModel[]];
+  /** Light from infinity, with neither its strength nor its rotation. */
+  environment?: LightFile | null;
   objects: { name: string; glb_node: string; moving: boolean; splats: SplatFile | null; shapes?: ShapeFile | null }[];
   world?: {
     plane?: { pose: Pose; width_m: number; height_m: number; endless: boolean };

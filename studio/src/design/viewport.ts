@@ -78,6 +78,7 @@ export class Viewport {
     stage.animate = (dt) => this.animate(dt);
     stage.hurried = (hurried) => this.content.coarsen(hurried);
     stage.draw = (renderer) => {
+      if (this.content.takeMovedShadows()) stage.moveShadows();
       if (!this.eye.large) {
         this.markers.face(stage.camera, stage.height);
         this.axes.show(stage.camera);

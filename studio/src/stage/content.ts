@@ -12,7 +12,6 @@ import {
   MeshBasicMaterial,
   type Object3D,
   PlaneGeometry,
-  Quaternion,
   Raycaster,
   RepeatWrapping,
   SRGBColorSpace,
@@ -23,9 +22,13 @@ import {
   type Camera,
 } from "three";
 import type { Json, SceneInfo } from "../api/types.ts";
+import { getIn } from "../document/values.ts";
+import { say } from "../ui/status.ts";
 import { anisotropy, drawnBySoftware } from "./gpu.ts";
 import { matrixOf, PoseTrack } from "./frames.ts";
-import { loadMesh, loadWhole, type Made } from "./mesh.ts";
+import { type Environment, loadEnvironment, surround } from "./environment.ts";
+import { lightModel, prepareRectangles, SceneLights } from "./lights.ts";
+import { loadMesh, loadWhole, type Made, replaceTexture } from "./mesh.ts";
 import { Shapes } from "./shapes.ts";
 import { loadSplats } from "./splats.ts";
 
@@ -45,6 +48,9 @@ export class SceneContent {
   private made: Made = { group: new Group(), details: [], small: [] };
   private splats: (SplatMesh | null)[] = [];
   private shapes: Shapes[] = [];
+  private lights = new SceneLights(undefined);
+  private environment: Environment | null = null;
+  private shadowsMoved = false;
   private raycaster = new Raycaster();
 
   /** `changed` is called when its appearance changes. */
@@ -61,8 +67,11 @@ export class SceneContent {
       info.glb ? lighting : null,
     ]);
     if (key === this.key) return false;
-    const [made, ...splats] = await Promise.all([
+    const glossy = info.glb !== null && lightModel(lighting) === "pbr";
+    const [made, environment, , ...splats] = await Promise.all([
       make(info, lighting),
+      glossy ? loadEnvironment(info.environment, lighting) : null,
+      glossy ? prepareRectangles(lighting) : null,
       ...info.objects.map((object) => object.splats && loadSplats(object.splats)),
     ]);
     this.clear();
@@ -74,14 +83,49 @@ export class SceneContent {
     this.nodes = info.objects.map((object, i) => splats[i] ?? made.group.getObjectByName(object.glb_node) ?? null);
     this.shapes = info.objects.flatMap(({ shapes }, i) => {
       const node = this.nodes[i];
-      return shapes && node ? [new Shapes(shapes, node, this.changed)] : [];
+      return shapes && node ? [new Shapes(shapes, node, () => this.deformed())] : [];
     });
+    this.light(info, environment, lighting);
     this.group.updateMatrixWorld(true);
     this.bounds.makeEmpty();
     const box = info.middle ?? info.bounds;
     if (box) this.bounds.set(new Vector3(...box[0]), new Vector3(...box[1]));
     if (made.small.length > 0) void this.sharpen(made);
     return true;
+  }
+
+  private light(info: SceneInfo, environment: Environment | null, lighting: Json | undefined): void {
+    this.environment = environment;
+    if (environment) {
+      surround(this.made.group, environment);
+      if (environment.visible) this.group.add(makeSky(environment));
+    }
+    if (!info.glb) return;
+    this.lights = new SceneLights(lighting);
+    this.group.add(this.lights.group);
+    this.lights.carry(
+      (name) => this.nodes[info.objects.findIndex((object) => object.moving && object.name === name)] ?? null,
+    );
+    if (getIn(lighting, "shadows") !== true) return;
+    this.lights.castShadows(new Box3().setFromObject(this.made.group));
+    this.made.group.traverse((object) => {
+      if (object instanceof Mesh) object.castShadow = object.receiveShadow = true;
+    });
+    if (this.lights.withoutShadows > 0)
+      say(`Lights without shadows in the page: ${this.lights.withoutShadows}; the simulator's image has them all`);
+    this.shadowsMoved = true;
+  }
+
+  /** Whether shadows have changed since the last call. */
+  takeMovedShadows(): boolean {
+    const moved = this.shadowsMoved;
+    this.shadowsMoved = false;
+    return moved;
+  }
+
+  private deformed(): void {
+    this.shadowsMoved = true;
+    this.changed();
   }
 
   /** Whether drawing is so slow that the first image should be coarse. */
@@ -102,7 +146,7 @@ export class SceneContent {
       const whole = await loadWhole(texture, url).catch(() => null);
       if (this.made !== made) return whole?.dispose();
       if (!whole) continue;
-      for (const material of materials) material.map = whole;
+      for (const material of materials) replaceTexture(material, texture, whole);
       texture.dispose();
       this.changed();
       await frames(1);
@@ -122,18 +166,22 @@ export class SceneContent {
       if (!(object instanceof Mesh)) return;
       object.geometry.dispose();
       for (const material of ([] as Material[]).concat(object.material as Material)) {
-        (material as MeshBasicMaterial).map?.dispose();
+        for (const value of Object.values(material)) if (value instanceof Texture) value.dispose();
         material.dispose();
       }
     });
-    this.made.surroundings?.dispose();
+    this.environment?.texture.dispose();
+    this.environment = null;
+    this.lights.dispose();
     this.group.clear();
     this.nodes = [];
     this.made = { group: new Group(), details: [], small: [] };
   }
 
-  /** Moves the objects to their poses at a time, and deforms them. The body's trajectory begins at `start`. */
+  /** Moves the objects to their poses at a time, deforms them, and changes the lights. The body's trajectory begins at `start`. */
   place(tracks: (PoseTrack | undefined)[], time: number, start: number): void {
+    this.shadowsMoved = true;
+    this.lights.at(time / 1e9);
     for (const shapes of this.shapes) shapes.show(time - start);
     for (let i = 0; i < this.nodes.length; ++i) {
       const node = this.nodes[i];
@@ -181,7 +229,7 @@ async function make(info: SceneInfo, lighting: Json | undefined): Promise<Made> 
   texture.colorSpace = SRGBColorSpace;
   texture.minFilter = LinearMipmapLinearFilter;
   texture.anisotropy = anisotropy();
-  if (info.kind === "panorama") group.add(makePanorama(texture, info));
+  if (info.kind === "panorama") group.add(makePanorama(texture, info.world?.panorama?.orientation));
   else if (info.kind === "plane") group.add(makePlane(texture, info));
   return made;
 }
@@ -189,7 +237,7 @@ async function make(info: SceneInfo, lighting: Json | undefined): Promise<Made> 
 const panorama_radius_m = 200;
 
 /** The image's centre is along x, its upper edge at the zenith, its right half to the right (towards -y). */
-function makePanorama(texture: Texture, info: SceneInfo): Mesh {
+function makePanorama(texture: Texture, orientation: [number, number, number, number] = [0, 0, 0, 1]): Mesh {
   const [columns, rows] = [96, 48];
   const [positions, uvs, indices] = [[] as number[], [] as number[], [] as number[]];
   for (let row = 0; row <= rows; ++row) {
@@ -213,9 +261,20 @@ function makePanorama(texture: Texture, info: SceneInfo): Mesh {
   geometry.setIndex(indices);
   texture.minFilter = LinearFilter; // mipmaps would show the seam
   const mesh = new Mesh(geometry, new MeshBasicMaterial({ map: texture, side: 2, depthWrite: false }));
-  const orientation = info.world?.panorama?.orientation;
-  if (orientation) mesh.quaternion.copy(new Quaternion(...orientation).normalize());
+  mesh.quaternion.set(...orientation).normalize();
   return mesh;
+}
+
+/** The environment behind the surfaces, which is nowhere to point at. */
+function makeSky({ texture, turned_rad }: Environment): Mesh {
+  const sky = makePanorama(texture);
+  sky.rotation.z = turned_rad;
+  sky.frustumCulled = false;
+  sky.onBeforeRender = (_renderer, _scene, camera) => {
+    sky.matrixWorld.setPosition(new Vector3().setFromMatrixPosition(camera.matrixWorld)); // infinitely far
+  };
+  sky.raycast = () => undefined;
+  return sky;
 }
 
 /** The plane's frame has its origin at the image's centre, x right and y down. */

@@ -2,7 +2,7 @@ import { Matrix4, type PerspectiveCamera, Quaternion, Vector3 } from "three";
 import type { CameraModel, Pose } from "../api/types.ts";
 
 /** Cameras here look along z with y down; those of three.js along -z with y up. */
-const flip = new Quaternion(1, 0, 0, 0);
+export const flip = new Quaternion(1, 0, 0, 0);
 
 export function matrixOf(pose: Pose, into = new Matrix4()): Matrix4 {
   return into.compose(
@@ -68,8 +68,8 @@ export function imageCorners(model: CameraModel): Vector3[] {
 /** Orientation of a frame whose z axis points from `from` to `to`, with y as far downwards as possible (world z, or `up`, is up). */
 export function lookRotation(from: Vector3, to: Vector3, up = new Vector3(0, 0, 1)): Quaternion {
   const z = to.clone().sub(from).normalize();
-  let x = z.clone().cross(up);
-  if (x.lengthSq() < 1e-12) x = z.clone().cross(new Vector3(1, 0, 0));
+  const x = z.clone().cross(up);
+  if (x.lengthSq() < 1e-12) x.set(1, 0, 0); // straight up or down
   x.normalize();
   const y = z.clone().cross(x);
   return new Quaternion().setFromRotationMatrix(new Matrix4().makeBasis(x, y, z));

@@ -1,31 +1,26 @@
 import {
-  AmbientLight,
   BufferGeometry,
   type BufferAttribute,
-  DataTexture,
-  DataUtils,
-  DirectionalLight,
-  EquirectangularReflectionMapping,
   Group,
-  HalfFloatType,
   ImageBitmapLoader,
   Mesh,
   MeshBasicMaterial,
   MeshLambertMaterial,
   MeshStandardMaterial,
-  type Object3D,
-  PointLight,
-  RGBAFormat,
   Source,
   type Texture,
 } from "three";
 import { type GLTF, GLTFLoader } from "three/addons/loaders/GLTFLoader.js";
 import type { Json } from "../api/types.ts";
-import { getIn } from "../document/values.ts";
 import { anisotropy } from "./gpu.ts";
+import { type LightModel, lightModel } from "./lights.ts";
 
 /** The materials of the page. */
 type Shown = MeshBasicMaterial | MeshLambertMaterial | MeshStandardMaterial;
+
+/** What textures are for. */
+const uses = ["map", "emissiveMap", "roughnessMap", "metalnessMap", "normalMap"] as const;
+type Textures = Partial<Record<(typeof uses)[number], Texture | null>>;
 
 /** A surface with all triangles and with few, which share vertices. */
 interface Detail {
@@ -41,21 +36,24 @@ interface SmallTexture {
   materials: Shown[];
 }
 
+/** Replaces a texture of a material, whatever it is for. */
+export function replaceTexture(material: Shown, texture: Texture, by: Texture): void {
+  const textures = material as Textures;
+  for (const use of uses) if (textures[use] === texture) textures[use] = by;
+}
+
 /** The objects made from a scene. */
 export interface Made {
   group: Group;
   details: Detail[];
   small: SmallTexture[];
-  /** What glossy surfaces reflect. */
-  surroundings?: Texture;
 }
 
 /** A scene file of the server. */
 export async function loadMesh(url: string, lighting: Json | undefined): Promise<Made> {
   const gltf = await new GLTFLoader().loadAsync(url);
   const made: Made = { group: new Group(), details: [], small: [] };
-  const type = getIn(lighting, "type");
-  const model = type === "lambert" || type === "pbr" ? type : "unlit";
+  const model = lightModel(lighting);
   const lit = model !== "unlit";
   const meshes: Mesh[] = [];
   gltf.scene.traverse((object) => {
@@ -72,36 +70,43 @@ export async function loadMesh(url: string, lighting: Json | undefined): Promise
     if (vertices !== undefined) mesh.userData["vertices"] = await gltf.parser.getDependency("accessor", vertices);
   }
   made.group.add(gltf.scene);
-  if (model === "lambert") made.group.add(ambientLight(lighting));
-  if (model === "pbr") made.surroundings = surround(made, lighting);
-  if (lit) made.group.add(...lights(lighting));
   return made;
 }
 
 function materialOf(
   given: MeshStandardMaterial | MeshBasicMaterial,
-  model: "unlit" | "lambert" | "pbr",
+  model: LightModel,
   url: string,
   made: Made,
 ): Shown {
-  const { map } = given;
-  const options = { map, color: given.color, side: given.side };
-  let material: Shown;
-  if (model === "unlit" || given instanceof MeshBasicMaterial) material = new MeshBasicMaterial(options);
-  else if (model === "lambert") material = new MeshLambertMaterial(options);
-  else material = new MeshStandardMaterial({ ...options, metalness: given.metalness, roughness: given.roughness });
+  const material = shown(given, model);
   given.dispose();
-  if (!map) return material;
-  map.anisotropy = anisotropy();
-  const known = made.small.find(({ texture }) => texture === map);
+  const textures = material as Textures;
+  for (const texture of new Set(uses.map((use) => textures[use]))) if (texture) keep(texture, material, url, made);
+  return material;
+}
+
+function shown(given: MeshStandardMaterial | MeshBasicMaterial, model: LightModel): Shown {
+  const { map, color, side } = given;
+  if (model === "unlit" || given instanceof MeshBasicMaterial) return new MeshBasicMaterial({ map, color, side });
+  const { emissive, emissiveMap } = given;
+  if (model === "lambert") return new MeshLambertMaterial({ map, color, side, emissive, emissiveMap });
+  const { metalness, metalnessMap, roughness, roughnessMap, normalMap, normalScale } = given;
+  const gloss = { metalness, metalnessMap, roughness, roughnessMap, normalMap, normalScale };
+  return new MeshStandardMaterial({ map, color, side, emissive, emissiveMap, ...gloss });
+}
+
+/** Remembers which materials have a texture that is small at first. */
+function keep(texture: Texture, material: Shown, url: string, made: Made): void {
+  texture.anisotropy = anisotropy();
+  const known = made.small.find((small) => small.texture === texture);
   if (known) {
     known.materials.push(material);
-    return material;
+    return;
   }
-  const { image } = map.userData as { image?: number };
+  const { image } = texture.userData as { image?: number };
   if (image !== undefined)
-    made.small.push({ texture: map, url: `${url.replace(/\.glb$/, "")}/${image}`, materials: [material] });
-  return material;
+    made.small.push({ texture, url: `${url.replace(/\.glb$/, "")}/${image}`, materials: [material] });
 }
 
 /** The texture in full size. */
@@ -123,43 +128,4 @@ async function addCoarse(mesh: Mesh, gltf: GLTF, made: Made): Promise<void> {
   whole.computeBoundingSphere();
   coarse.boundingSphere = whole.boundingSphere;
   made.details.push({ mesh, whole, coarse });
-}
-
-/** Lambertian irradiance of a white surface is `strength`; three.js divides by pi. */
-function ambientLight(lighting: Json | undefined): AmbientLight {
-  return new AmbientLight(0xffffff, Number(getIn(lighting, "ambient") ?? 0.3) * Math.PI);
-}
-
-/** The same light from all directions, which glossy surfaces reflect too. */
-function surround(made: Made, lighting: Json | undefined): Texture {
-  const light = DataUtils.toHalfFloat(Number(getIn(lighting, "ambient") ?? (getIn(lighting, "environment") ? 0 : 0.3)));
-  const [width, height] = [4, 2];
-  const opaque = DataUtils.toHalfFloat(1);
-  const values = Array.from({ length: width * height }, () => [light, light, light, opaque]).flat();
-  const texture = new DataTexture(new Uint16Array(values), width, height, RGBAFormat, HalfFloatType);
-  texture.mapping = EquirectangularReflectionMapping;
-  texture.needsUpdate = true;
-  made.group.traverse((object) => {
-    if (object instanceof Mesh && object.material instanceof MeshStandardMaterial) object.material.envMap = texture;
-  });
-  return texture;
-}
-
-function lights(lighting: Json | undefined): Object3D[] {
-  const result: Object3D[] = [];
-  const listed = (name: string) => (getIn(lighting, name) as Json[] | undefined) ?? [];
-  const vector = (light: Json, name: string, otherwise: number[]) =>
-    (getIn(light, name) as number[] | undefined) ?? otherwise;
-  const strength = (light: Json) => Number(getIn(light, "strength") ?? 1) * Math.PI;
-  for (const sun of listed("suns")) {
-    const light = new DirectionalLight(0xffffff, strength(sun));
-    light.position.fromArray(vector(sun, "direction", [0, 0, -1])).negate();
-    result.push(light);
-  }
-  for (const point of listed("points")) {
-    const light = new PointLight(0xffffff, strength(point), 0, 2);
-    light.position.fromArray(vector(point, "position", [0, 0, 0]));
-    result.push(light);
-  }
-  return result;
 }

@@ -1,4 +1,4 @@
-import { Color, PerspectiveCamera, Scene, type WebGLRenderer } from "three";
+import { Color, PCFSoftShadowMap, PerspectiveCamera, Scene, type WebGLRenderer } from "three";
 import { h } from "../ui/dom.ts";
 import { makeRenderer } from "./gpu.ts";
 import { Haste } from "./haste.ts";
@@ -46,6 +46,9 @@ export class Stage {
       return;
     }
     this.renderer.autoClear = false;
+    this.renderer.shadowMap.enabled = true;
+    this.renderer.shadowMap.type = PCFSoftShadowMap;
+    this.renderer.shadowMap.autoUpdate = false; // see moveShadows()
     this.element.append(this.renderer.domElement);
     this.renderer.domElement.addEventListener("webglcontextrestored", () => this.invalidate());
     new ResizeObserver(() => this.resize()).observe(this.element);
@@ -73,6 +76,11 @@ export class Stage {
   hurry(): void {
     this.haste.hurry();
     this.setHurried(true);
+  }
+
+  /** Draws the shadows again in the next frame. */
+  moveShadows(): void {
+    if (this.renderer) this.renderer.shadowMap.needsUpdate = true;
   }
 
   /** The content has changed: forgets how slow it was. */

@@ -228,15 +228,20 @@ void Environment::turn(const Image<float>& image, float* values) const {
   map.fold(values);
 }
 
-std::shared_ptr<const Environment> load_environment(const std::filesystem::path& file, float strength,
-                                                    double rotation_rad, bool colour) {
+Planes load_environment_image(const std::filesystem::path& file, bool colour) {
   Planes planes;
   load_planes(file, Encoding::automatic, colour, planes);
   if (planes[0].width() != 2 * planes[0].height()) {
     throw UserError(fmt::format("environment {}: must be equirectangular, twice as wide as high, not {} x {} pixels",
                                 file.string(), planes[0].width(), planes[0].height()));
   }
-  return std::make_shared<const Environment>(planes, strength, rotation_rad, "environment " + file.string());
+  return planes;
+}
+
+std::shared_ptr<const Environment> load_environment(const std::filesystem::path& file, float strength,
+                                                    double rotation_rad, bool colour) {
+  return std::make_shared<const Environment>(load_environment_image(file, colour), strength, rotation_rad,
+                                             "environment " + file.string());
 }
 
 }  // namespace esim::inline scene

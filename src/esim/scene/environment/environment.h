@@ -67,7 +67,11 @@ class Environment {
   std::array<std::shared_ptr<const Texture>, 4> skies_;  // luminance, red, green, blue
 };
 
-/// Reads an environment. Throws UserError, naming the file, if it cannot be read or is not twice as wide as high.
+/// Reads an equirectangular image in linear light: its planes for an Environment. Throws UserError, naming the file, if
+/// it cannot be read or is not twice as wide as high.
+Planes load_environment_image(const std::filesystem::path& file, bool colour);
+
+/// Reads an environment. Throws UserError as above.
 std::shared_ptr<const Environment> load_environment(const std::filesystem::path& file, float strength,
                                                     double rotation_rad, bool colour);
 

@@ -7,6 +7,8 @@
 namespace esim::inline scene {
 namespace {
 
+constexpr const char* kNoRelief = "its surfaces have no relief";
+
 float clamped(const char* what, float value, const std::string& material, const WarningHandler& warn) {
   if (value >= 0 && value <= 1) return value;
   const float nearest = std::clamp(value, 0.0F, 1.0F);
@@ -45,7 +47,7 @@ GlossTextures::Normals GlossTextures::normals(const GraphTexture& slot, float sc
   if (slot.image < 0) return {};
   const auto [entry, is_new] = normals_.try_emplace({slot.image, slot.wrap_u, slot.wrap_v, scale});
   if (!is_new) return entry->second;
-  Planes planes = store_.numbers(slot, material, "its surfaces have no relief");
+  Planes planes = store_.numbers(slot, material, kNoRelief);
   if (planes.empty()) return {};
   normalise(scale, planes);
   for (std::size_t c = 0; c < 3; ++c)
@@ -61,12 +63,18 @@ std::shared_ptr<const Gloss> GlossTextures::convert(const GraphMaterial& source)
   gloss.roughness = clamped("roughness", source.roughness, name, store_.warning());
   gloss.reflectance = clamped("reflectance", source.reflectance, name, store_.warning());
   gloss.edge_reflectance = clamped("specular factor", source.edge_reflectance, name, store_.warning());
-  if (store_.look() == SceneLook::coded) return std::make_shared<const Gloss>(std::move(gloss));
-  gloss.roughness_texture =
-      channel(source.roughness_texture, kGreen, name, fmt::format("its roughness is {} everywhere", gloss.roughness));
-  gloss.metallic_texture = channel(source.metallic_texture, kBlue, name,
-                                   fmt::format("its metallic factor is {} everywhere", gloss.metallic));
-  gloss.normal_textures = normals(source.normal_texture, source.normal_scale, name);
+  const std::string even_roughness = fmt::format("its roughness is {} everywhere", gloss.roughness),
+                    even_metallic = fmt::format("its metallic factor is {} everywhere", gloss.metallic);
+  if (store_.look() == SceneLook::coded) {
+    gloss.coded_roughness = store_.coded(source.roughness_texture, name, even_roughness);
+    gloss.coded_metallic = store_.coded(source.metallic_texture, name, even_metallic);
+    gloss.coded_normals = store_.coded(source.normal_texture, name, kNoRelief);
+    gloss.normal_scale = source.normal_scale;
+  } else {
+    gloss.roughness_texture = channel(source.roughness_texture, kGreen, name, even_roughness);
+    gloss.metallic_texture = channel(source.metallic_texture, kBlue, name, even_metallic);
+    gloss.normal_textures = normals(source.normal_texture, source.normal_scale, name);
+  }
   return std::make_shared<const Gloss>(std::move(gloss));
 }
 

@@ -18,7 +18,7 @@ class GlossTextures {
   explicit GlossTextures(TextureStore& store) : store_(store) {}
 
   /// A factor outside 0 to 1 is clamped, and a texture that cannot be read is left out, both after a warning. With
-  /// SceneLook::coded, only factors.
+  /// SceneLook::coded, textures stay encoded.
   std::shared_ptr<const Gloss> convert(const GraphMaterial& source);
 
  private:

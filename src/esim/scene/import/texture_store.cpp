@@ -96,7 +96,8 @@ std::shared_ptr<const Texture> TextureStore::get(const GraphTexture& slot, const
   return wanted;
 }
 
-std::shared_ptr<const CodedTexture> TextureStore::coded(const GraphTexture& slot, const std::string& material) {
+std::shared_ptr<const CodedTexture> TextureStore::coded(const GraphTexture& slot, const std::string& material,
+                                                        const std::string& assumed) {
   if (slot.image < 0) return nullptr;
   const auto [entry, is_new] = coded_.try_emplace({slot.image, slot.wrap_u, slot.wrap_v});
   if (!is_new) return entry->second;
@@ -104,7 +105,7 @@ std::shared_ptr<const CodedTexture> TextureStore::coded(const GraphTexture& slot
     entry->second = std::make_shared<const CodedTexture>(read(slot));
     ++image_count_;
   } catch (const UserError& error) {
-    warn_failed(material, error);
+    warn_failed(material, error, assumed);
   }
   return entry->second;
 }

@@ -30,8 +30,9 @@ class TextureStore {
   std::shared_ptr<const Texture> get(const GraphTexture& slot, const Eigen::Vector3f& factor,
                                      const std::string& material, View view);
 
-  /// The encoded image. Null as above; the bytes are not checked.
-  std::shared_ptr<const CodedTexture> coded(const GraphTexture& slot, const std::string& material);
+  /// The encoded image. Null as above; the bytes are not checked. The warning says what is `assumed` without it.
+  std::shared_ptr<const CodedTexture> coded(const GraphTexture& slot, const std::string& material,
+                                            const std::string& assumed = kGrey);
 
   /// An image of numbers, not of light: its R, G and B from 0 to 1 as the file has them. Empty if it is missing, not
   /// allowed or unreadable, after a warning that names the material and says what is `assumed` instead.
@@ -43,12 +44,12 @@ class TextureStore {
   std::size_t image_count() const { return image_count_; }
 
  private:
+  static constexpr const char* kGrey = "its surfaces are grey";
   using Views = std::array<std::shared_ptr<const Texture>, 4>;
 
   Views views_of(const GraphTexture& slot, const Eigen::Vector3f& factor);
   CodedTexture read(const GraphTexture& slot) const;
-  void warn_failed(const std::string& material, const UserError& error,
-                   const std::string& assumed = "its surfaces are grey") const;
+  void warn_failed(const std::string& material, const UserError& error, const std::string& assumed = kGrey) const;
   void count_texels(const Planes& planes);
 
   const SceneGraph& graph_;

@@ -119,6 +119,14 @@ Json shapes_json(const SceneObject& object, const std::string& address) {
           {"end", span.end}};
 }
 
+constexpr std::string_view kEnvironment = "environment.light";
+
+Json environment_json(const StudioScene& scene, const std::string& base) {
+  const auto& light = scene.environment();
+  if (!light) return nullptr;
+  return {{"file", fmt::format("{}/{}", base, kEnvironment)}, {"width", light->width}, {"height", light->height}};
+}
+
 Json scene_json(const Scenario& scenario, SceneStore& scenes) {
   if (engine_objects(scenario.renderer) != nullptr) return engine_json(scenario);
   const auto scene = scenes.of(scenario);
@@ -128,7 +136,8 @@ Json scene_json(const Scenario& scenario, SceneStore& scenes) {
               {"texture", scene->texture() ? Json(base + ".jpg") : Json()},
               {"triangles", scene->triangles()},
               {"bounds", bounds_of(*scene)},
-              {"middle", box_json(middle_of(*scene))}};
+              {"middle", box_json(middle_of(*scene))},
+              {"environment", environment_json(*scene, base)}};
   std::visit(DescribeKind{*scene, answer}, scenario.renderer);
   answer["cameras"] = cameras_json(cameras_of(scenario, scene->file()));
   answer["start"] = json_of(start_of(*scene));
@@ -189,7 +198,7 @@ Response shapes_of(const Request& request, const Deformation& deformation, std::
   return response;
 }
 
-/// A texture of a mesh in full resolution, or the splats or the shapes of an object.
+/// A texture of a mesh in full resolution, the splats or the shapes of an object, or the environment.
 Response scene_part(const Request& request, SceneStore& scenes) {
   constexpr std::string_view kSplats = ".splat", kShapes = ".shapes";
   const auto scene = scenes.find(request.captured[0]);
@@ -197,6 +206,11 @@ Response scene_part(const Request& request, SceneStore& scenes) {
   std::string_view name = request.captured[1];
   Response response;
   response.headers = {{"Cache-Control", kKept}};
+  if (name == kEnvironment && scene->environment()) {
+    response.content_type = content_type_of(request.captured[1]);
+    response.body = scene->environment()->halves;
+    return response;
+  }
   if (name.ends_with(kSplats)) {
     name.remove_suffix(kSplats.size());
     const auto index = number_in(name);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <limits>
 #include <map>
@@ -51,6 +52,12 @@ Look emission_of(const PerColour<const Material*>& material) {
   return look;
 }
 
+/// All textures of a material; some may be null.
+std::array<std::shared_ptr<const CodedTexture>, 5> textures_of(const Material& material) {
+  const Gloss none, &gloss = material.gloss ? *material.gloss : none;
+  return {material.coded, material.coded_emission, gloss.coded_roughness, gloss.coded_metallic, gloss.coded_normals};
+}
+
 bool is_dark(const Look& look) {
   return std::all_of(look.factor.begin(), look.factor.end(), [](double f) { return f <= 0; });
 }
@@ -90,7 +97,7 @@ class Writer {
     std::vector<std::shared_ptr<const CodedTexture>> all;
     for (const SceneObject& object : scene.objects) {
       for (const Material& material : object.mesh.coloured[0]) {
-        for (const auto& texture : {material.coded, material.coded_emission}) {
+        for (const auto& texture : textures_of(material)) {
           if (texture != nullptr && textures_.try_emplace(texture.get()).second) all.push_back(texture);
         }
       }
@@ -233,24 +240,33 @@ class Writer {
     Look base = base_of(channels), emission = emission_of(channels);
     if (unlit && is_dark(base)) std::swap(base, emission);
     Json surface{{"baseColorFactor", factor(base, 1)}, {"metallicFactor", 0}, {"roughnessFactor", 1}};
-    if (const auto& gloss = channels[0]->gloss) {
-      surface["metallicFactor"] = gloss->metallic;
-      surface["roughnessFactor"] = gloss->roughness;
-    }
-    if (const auto texture = texture_of(base)) {
+    Json material{{"name", mesh.materials[index].name}, {"doubleSided", true}};
+    if (channels[0]->gloss && !unlit) add_gloss(*channels[0]->gloss, surface, material);
+    if (const auto texture = texture_of(base.texture)) {
       surface["baseColorTexture"] = {{"index", *texture}};
     } else if (base.texture != nullptr) {
       base.factor.fill(kMissingTexture);
       surface["baseColorFactor"] = factor(base, 1);
     }
-    Json material{{"name", mesh.materials[index].name}, {"doubleSided", true}, {"pbrMetallicRoughness", surface}};
+    material["pbrMetallicRoughness"] = surface;
     if (unlit) material["extensions"] = {{"KHR_materials_unlit", Json::object()}};
     if (!unlit && !is_dark(emission)) {
       material["emissiveFactor"] = factor(emission, std::nullopt);
-      if (const auto texture = texture_of(emission)) material["emissiveTexture"] = {{"index", *texture}};
+      if (const auto texture = texture_of(emission.texture)) material["emissiveTexture"] = {{"index", *texture}};
     }
     gltf_["materials"].push_back(std::move(material));
     return entry->second;
+  }
+
+  /// glTF has one texture for roughness and metallic factor: two different files are left out.
+  void add_gloss(const Gloss& gloss, Json& surface, Json& material) const {
+    surface["metallicFactor"] = gloss.metallic;
+    surface["roughnessFactor"] = gloss.roughness;
+    const bool one = gloss.coded_metallic == gloss.coded_roughness || gloss.metallic == 0;
+    if (const auto texture = one ? texture_of(gloss.coded_roughness.get()) : std::nullopt)
+      surface["metallicRoughnessTexture"] = {{"index", *texture}};
+    if (const auto texture = texture_of(gloss.coded_normals.get()))
+      material["normalTexture"] = {{"index", *texture}, {"scale", gloss.normal_scale}};
   }
 
   static Json factor(const Look& look, std::optional<double> alpha) {
@@ -260,8 +276,8 @@ class Writer {
     return numbers;
   }
 
-  std::optional<std::size_t> texture_of(const Look& look) const {
-    return look.texture == nullptr ? std::nullopt : textures_.at(look.texture);
+  std::optional<std::size_t> texture_of(const CodedTexture* texture) const {
+    return texture == nullptr ? std::nullopt : textures_.at(texture);
   }
 
   std::size_t add_texture(const std::shared_ptr<const CodedTexture>& texture, const Thumbnail& thumbnail) {

@@ -20,7 +20,8 @@ struct Glb {
 };
 
 /// One node per object, in the object's frame; unlit if the scene has no lights. Surfaces that shine have their
-/// metallic and roughness factors, without textures of these. In scenes with more than 100 000 triangles, the `extras`
+/// metallic and roughness factors, their textures and normal maps; textures of roughness and of metallic factors that
+/// are different images are left out. In scenes with more than 100 000 triangles, the `extras`
 /// of each primitive have `coarse`, an accessor of the indices of far fewer triangles with the same vertices. The
 /// `extras` of the primitives of a deforming object have `vertices`, an accessor of the mesh's vertex for each of
 /// theirs. The scene must be loaded with SceneLook::coded.

@@ -1,6 +1,8 @@
 #include "esim/studio/scene_view/page_images.h"
 
+#include <Eigen/Core>
 #include <algorithm>
+#include <cstdint>
 #include <optional>
 #include <span>
 #include <string_view>
@@ -105,6 +107,22 @@ Thumbnail thumbnail(const CodedTexture& texture, int longest) {
   if (const auto rgb = reduced(texture, longest)) return {jpeg_of(*rgb), false};
   const Planes planes = decoded(texture, true);
   return {make_jpeg(planes, longest), std::max(planes.front().width(), planes.front().height()) <= longest};
+}
+
+PageLight page_light(const Planes& linear, int longest) {
+  constexpr float kGreatest = 65504;
+  Planes reduced;
+  for (const Image<float>& plane : linear) reduced.push_back(at_most(plane, longest));
+  PageLight light{reduced.front().width(), reduced.front().height(), {}};
+  light.halves.reserve(2 * 3 * reduced.front().size());
+  for (std::size_t i = 0; i < reduced.front().size(); ++i) {
+    for (const std::size_t colour : {std::size_t{0}, reduced.size() / 2, reduced.size() - 1}) {
+      const Eigen::half value(std::clamp(reduced[colour].pixels()[i], 0.0F, kGreatest));
+      const auto bits = Eigen::numext::bit_cast<std::uint16_t>(value);
+      light.halves += static_cast<char>(bits & 0xffU), light.halves += static_cast<char>(bits >> 8U);
+    }
+  }
+  return light;
 }
 
 std::string make_jpeg(const Planes& linear, int longest) {

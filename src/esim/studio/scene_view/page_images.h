@@ -30,4 +30,13 @@ Thumbnail thumbnail(const CodedTexture& texture, int longest);
 /// Converts one plane or three to sRGB of at most `longest` px; values above white are clipped.
 std::string make_jpeg(const Planes& linear, int longest);
 
+/// Light for a browser that keeps values above white.
+struct PageLight {
+  int width = 0, height = 0;
+  std::string halves;  ///< R, G and B of each pixel, row by row from the top: IEEE 754 half precision, little-endian
+};
+
+/// Reduces one plane or three to at most `longest` px. Values outside 0 to 65504 are clipped.
+PageLight page_light(const Planes& linear, int longest);
+
 }  // namespace esim::studio

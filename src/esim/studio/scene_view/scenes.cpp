@@ -7,6 +7,7 @@
 #include "esim/core/error.h"
 #include "esim/scenario/read.h"
 #include "esim/scenario/schema.h"
+#include "esim/scene/environment/environment.h"
 #include "esim/scene/images/image_file.h"
 
 namespace esim::studio {
@@ -15,7 +16,7 @@ namespace {
 const Notices kSilent{[](const std::string&) {}, [](const std::string&) {}};
 
 constexpr std::size_t kMaxScenes = 3;
-constexpr int kLongestPicture = 4096;
+constexpr int kLongestPicture = 4096, kLongestEnvironment = 1024;
 constexpr int kFiner = 2;  // even: see ScenePictures::render()
 
 std::string stamp_of(const std::filesystem::path& file) {
@@ -81,6 +82,19 @@ bool fails_when_made(const RendererOptions& renderer, const Scene& scene) {
   return false;
 }
 
+/// Null without one.
+const EnvironmentOptions* environment_of(const RendererOptions& renderer) {
+  return std::visit(
+      [](const auto& options) -> const EnvironmentOptions* {
+        if constexpr (requires { options.lighting; }) {
+          const auto* const pbr = std::get_if<PbrOptions>(&options.lighting);
+          if (pbr != nullptr && pbr->environment) return &*pbr->environment;
+        }
+        return nullptr;
+      },
+      renderer);
+}
+
 void refuse_engines(const Scenario& scenario) {
   if (engine_objects(scenario.renderer) != nullptr)
     throw UserError(
@@ -98,6 +112,8 @@ StudioScene::StudioScene(const Scenario& scenario, std::string id, int threads)
   if (fails_when_made(scenario.renderer, file_.scene)) pictures();
   splats_ = page_splats(file_.scene);
   for (SceneObject& object : file_.scene.objects) object.splats = nullptr;  // they may take gigabytes
+  if (const EnvironmentOptions* const environment = environment_of(scenario.renderer))
+    environment_ = page_light(load_environment_image(environment->image, true), kLongestEnvironment);
   const bool mesh = std::holds_alternative<MeshRendererOptions>(scenario.renderer);
   if (mesh || triangles() > 0) {
     if (triangles() <= kMaxTriangles) glb_ = make_glb(file_.scene, Workers(threads));

@@ -33,6 +33,9 @@ class StudioScene {
   const std::optional<std::string>& texture() const { return texture_; }
   double texture_aspect() const { return texture_aspect_; }  ///< height / width
 
+  /// Light from infinity, with neither its strength nor its rotation; empty without one.
+  const std::optional<PageLight>& environment() const { return environment_; }
+
   std::size_t triangles() const;
 
   /// A texture of the GLB in full resolution; null if the index is invalid. Throws UserError if it cannot be decoded.
@@ -57,6 +60,7 @@ class StudioScene {
   std::optional<Glb> glb_;
   std::optional<std::string> texture_;
   double texture_aspect_ = 1;
+  std::optional<PageLight> environment_;
 };
 
 /// The recently used scenes.

@@ -248,6 +248,63 @@ test("splats are seen where the simulator sees them; they are clicked, and they 
   assert.deepEqual(state.faults, []);
 });
 
+test("lamps, their shadows and the sky are where the simulator sees them, and change with time", async () => {
+  // The sky is blue above, and red towards +y.
+  const sky = Buffer.alloc(3 * 64 * 32);
+  for (let row = 0; row < 32; ++row) {
+    for (let column = 0; column < 64; ++column) {
+      const red = Math.floor(column / 16) === 1;
+      sky.set(row < 12 ? [90, 130, 230] : red ? [200, 60, 50] : [90, 90, 90], 3 * (64 * row + column));
+    }
+  }
+  writeFileSync(join(files.folder, "sky.ppm"), Buffer.concat([Buffer.from("P6 64 32 255\n"), sky]));
+  write("floor.obj", "v -2 -2 -0.5\nv 2 -2 -0.5\nv 2 2 -0.5\nv -2 2 -0.5\nf 1 2 3 4\n");
+  write(
+    "shine.yaml",
+    `renderer:
+  type: mesh
+  scene: floor.obj
+  objects: [{name: vane, scene: ball.glb, scale: 5, trajectory: {type: static, pose: {position: [0, 0.8, 0]}}}]
+  lighting:
+    type: pbr
+    shadows: true
+    environment: {image: sky.ppm, strength: 0.7, rotation_deg: 30}
+    areas: [{position: [-1, -1, 0.8], direction: [1, 1, -0.8], size: [0.3, 0.9], rotation_deg: 20, strength: 0.6}]
+    points: [{position: [-0.9, -0.5, 0.6], strength: 0.8, object: vane, curve: [[0, 0], [1, 1]]}]
+    suns: [{direction: [0.2, -0.9, -1], strength: 0.8}]
+duration_s: 1
+trajectory: {type: static, pose: {position: [-1.6, 0.4, 0.7], look_at: [0, 0.4, -0.1]}}
+${camera}`,
+  );
+  const page = await design("shine.yaml");
+  await until(async () => / of /.test(await clock(page).textContent()), "the flight");
+  await page.waitForTimeout(2000); // textures arrive
+  await stage(page).focus();
+  await page.keyboard.press("c");
+  const eye = page.locator(".eye-view");
+  const preview = async () => {
+    await page.waitForTimeout(600);
+    return eye.screenshot();
+  };
+  const start = await preview();
+  await page.locator(".timeline .plot").press("End");
+  const end = await preview();
+  await shot(page, "lights-page-dark");
+  const lamp = await differing(page, start, end);
+  assert.ok(lamp > 0.1, `the lamp that the vane carries becomes brighter: ${lamp}`);
+  await page.getByRole("radio", { name: "Simulator" }).click();
+  await until(async () => (await page.locator(".eye canvas").evaluate(({ width }) => width)) === 160, "the picture");
+  await page.waitForTimeout(300);
+  const simulated = await eye.screenshot();
+  await shot(page, "lights-simulator-dark");
+  await page.getByRole("radio", { name: "Preview" }).click();
+  await page.keyboard.press("c");
+  const differ = await differing(page, end, simulated);
+  assert.ok(differ < 0.05, `the simulator sees the same: ${differ}`);
+  assert.ok((await differing(page, start, simulated)) > 0.1, "the test sees lamps");
+  assert.deepEqual(state.faults, []);
+});
+
 test("the ground of the picture in 3D follows the theme", async () => {
   const page = await design("ball.yaml");
   const corner = async () => {

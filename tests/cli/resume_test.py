@@ -22,7 +22,7 @@ DURATION_S = float(sys.argv[4]) if len(sys.argv) > 4 else 2
 
 OPTIONS = ["--set", "sampling={type: uniform, rate_hz: 200}", "--set", "imu={}", "--set", "camera.frame_camera={rate_hz: 30}",
            "--set", "truth={rate_hz: 20, optical_flow: true}", "--set", f"duration_s={DURATION_S}", "--set", "trajectory.time_scale=2", "--set", "output.formats=[evt3, text]",
-           "--set", "output.samples=exact", "--set", "camera.width=160", "--set", "camera.height=120"]
+           "--set", "output.samples=exact", "--set", "camera.width=96", "--set", "camera.height=72"]
 SCENE = SCENES / "room.yaml"
 
 

@@ -278,7 +278,7 @@ inline std::vector<SplatObject> splat_objects(bool moving) {
   const auto make = [](float scale) {
     Mesh mesh = box_mesh();
     for (Eigen::Vector3f& vertex : mesh.vertices) vertex *= scale;
-    return std::make_shared<const Splats>(splats_of(mesh, scale < 1 ? 0.008F : 0.05F));
+    return std::make_shared<const Splats>(splats_of(mesh, scale < 1 ? 0.014F : 0.08F));
   };
   std::vector<SplatObject> objects{{make(1)}};
   if (moving) objects.insert(objects.end(), {{make(0.15F), 0}, {make(0.2F), 1}});

@@ -1,6 +1,7 @@
 #include "esim/reproject/cells.h"
 
 #include <algorithm>
+#include <limits>
 
 namespace esim::inline reproject {
 namespace {
@@ -19,28 +20,46 @@ void Cells::look(const std::vector<SeenPoints>& keyframes, bool moves, VisibleSu
   splat_.splat(keyframes, moves, cells_);
   const int width = cells_.nearness.width() / s_, height = cells_.nearness.height() / s_;
   pixels.resize(width, height, moves);
-  workers_.for_each(height, [&](int y) {
-    for (int x = 0; x < width; ++x) {
-      const Seen seen = at_centre(x, y);
-      pixels.nearness(x, y) = seen.nearness;
-      if (moves) pixels.part(x, y) = seen.part;
-      pixels.edge(x, y) = edge_in(x, y);
-    }
-  });
+  workers_.for_each(height, [&](int y) { look_at_row(y, moves, pixels); });
 }
 
-/// The surface at the centre of pixel (x, y), or the nearest surface in the pixel if no point falls on the centre.
-Cells::Seen Cells::at_centre(int x, int y) const {
-  const int left = s_ * x, top = s_ * y;
-  const int around = 2 - s_ % 2;  // without a central cell, cells meet at the centre
-  const int i = left + (s_ - around) / 2, j = top + (s_ - around) / 2;
-  Seen seen = nearest_of(i, j, around);
-  if (seen.nearness < 0) return nearest_of(left, top, s_);
-  if (around == 1) return seen;
-  const float a = cells_.nearness(i, j), b = cells_.nearness(i + 1, j), c = cells_.nearness(i, j + 1),
-              d = cells_.nearness(i + 1, j + 1);
-  if (std::min({a, b, c, d}) > (1 - kOneSurface) * seen.nearness) seen.nearness = 0.25F * (a + b + c + d);
-  return seen;
+/// The surfaces at the centres of the pixels of a row, and the first edge found in the cells of each.
+void Cells::look_at_row(int y, bool moves, VisibleSurface& pixels) const {
+  const int width = pixels.nearness.width(), s = s_;
+  const int around = 2 - s % 2, begin = (s - around) / 2;  // without a central cell, cells meet at the centre
+  float* const nearest = pixels.nearness.row(y);
+  Edge* const edge = pixels.edge.row(y);
+  std::vector<float> lowest_at(static_cast<std::size_t>(width), std::numeric_limits<float>::infinity()),
+      sum_at(lowest_at.size());
+  float *const lowest = lowest_at.data(), *const sum = sum_at.data();
+  std::fill_n(nearest, width, VisibleSurface::kNothing);
+  std::fill_n(edge, width, Edge::none);
+  for (int cell = 0; cell < around * around; ++cell) {
+    const float* const cells = cells_.nearness.row(s * y + begin + cell / around) + begin + cell % around;
+#pragma omp simd
+    for (int x = 0; x < width; ++x) {
+      const float here = cells[s * x];
+      nearest[x] = std::max(nearest[x], here), lowest[x] = std::min(lowest[x], here), sum[x] += here;
+    }
+  }
+  for (int cell = 0; cell < s * s; ++cell) {
+    const Edge* const cells = cells_.edge.row(s * y + cell / s) + cell % s;
+#pragma omp simd
+    for (int x = 0; x < width; ++x) edge[x] = edge[x] != Edge::none ? edge[x] : cells[s * x];
+  }
+  const float share = 1.0F / static_cast<float>(around * around);
+#pragma omp simd
+  for (int x = 0; x < width; ++x) nearest[x] = lowest[x] > (1 - kOneSurface) * nearest[x] ? share * sum[x] : nearest[x];
+
+  for (int x = 0; x < width; ++x) {
+    if (!moves && nearest[x] >= 0) continue;
+    Seen seen = nearest_of(s * x + begin, s * y + begin, around);
+    if (seen.nearness < 0) {
+      seen = nearest_of(s * x, s * y, s);
+      nearest[x] = seen.nearness;
+    }
+    if (moves) pixels.part(x, y) = seen.part;
+  }
 }
 
 /// The nearest surface in a square of cells.
@@ -52,14 +71,6 @@ Cells::Seen Cells::nearest_of(int left, int top, int width) const {
     }
   }
   return nearest;
-}
-
-/// The first edge found in the pixel's cells.
-Edge Cells::edge_in(int x, int y) const {
-  for (int j = y * s_; j < (y + 1) * s_; ++j)
-    for (int i = x * s_; i < (x + 1) * s_; ++i)
-      if (cells_.edge(i, j) != Edge::none) return cells_.edge(i, j);
-  return Edge::none;
 }
 
 }  // namespace esim::inline reproject

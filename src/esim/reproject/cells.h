@@ -16,8 +16,9 @@ class Cells {
   /// `greatest_radius`: limit of the bearings that the lens maps.
   Cells(const KeyframeLayout& layout, double greatest_radius, const Workers& workers);
 
-  /// Projects the keyframes' dense points into the cells, and finds the surfaces at the pixels' centres: kNothing if no
-  /// point falls into any of a pixel's cells. An edge crosses a pixel if it crosses one of its cells.
+  /// Projects the keyframes' dense points into the cells, and finds the surfaces at the pixels' centres: the nearest
+  /// one in the pixel if no point falls on the centre, and kNothing if no point falls into any of its cells. An edge
+  /// crosses a pixel if it crosses one of its cells.
   void look(const std::vector<SeenPoints>& keyframes, bool moves, VisibleSurface& pixels);
 
   /// The nearness and the part of a surface.
@@ -32,9 +33,8 @@ class Cells {
   }
 
  private:
-  Seen at_centre(int x, int y) const;
+  void look_at_row(int y, bool moves, VisibleSurface& pixels) const;
   Seen nearest_of(int left, int top, int width) const;
-  Edge edge_in(int x, int y) const;
 
   int s_;  // cells per side of a pixel
   const Workers& workers_;

@@ -93,12 +93,17 @@ struct Reprojector::Between {
     });
   }
 
-  /// E of point i; from both keyframes if neither sees it.
-  float blend(const RowLookup& in_before, const RowLookup& in_after, std::size_t i) const {
-    const bool neither = in_before.seen[i] + in_after.seen[i] == 0;
-    const float w0 = (1 - share) * (neither ? 1.0F : in_before.seen[i]);
-    const float w1 = share * (neither ? 1.0F : in_after.seen[i]);
-    return (w0 * in_before.value[i] + w1 * in_after.value[i]) / (w0 + w1);
+  /// E of the points; from both keyframes if neither sees one.
+  void blend(const RowLookup& in_before, const RowLookup& in_after, float* light) const {
+    const float *const seen0 = in_before.seen.data(), *const seen1 = in_after.seen.data();
+    const float *const value0 = in_before.value.data(), *const value1 = in_after.value.data();
+#pragma omp simd
+    for (std::size_t i = 0; i < in_before.count; ++i) {
+      const bool neither = seen0[i] + seen1[i] == 0;
+      const float w0 = (1 - share) * (neither ? 1.0F : seen0[i]);
+      const float w1 = share * (neither ? 1.0F : seen1[i]);
+      light[i] = (w0 * value0[i] + w1 * value1[i]) / (w0 + w1);
+    }
   }
 };
 
@@ -162,15 +167,17 @@ void Reprojector::look_up(const Between& between, const Model& model, Detail det
     };
     look(between.before, row0);
     look(between.after, row1);
-    float* const out = result.irradiance.row(y);
-    std::int64_t& nowhere = unseen[static_cast<std::size_t>(y)];
+    between.blend(row0, row1, result.irradiance.row(y));
+    const float *const seen0 = row0.seen.data(), *const seen1 = row1.seen.data();
+    Edge* const edge = surface_.edge.row(y);
+    int hidden = 0;
+#pragma omp simd reduction(+ : hidden)
     for (int x = 0; x < width; ++x) {
-      const auto i = static_cast<std::size_t>(x);
-      const bool hidden = row0.seen[i] + row1.seen[i] == 0;
-      nowhere += hidden;
-      if (hidden) surface_.edge(x, y) = Edge::outline;  // it is next to an outline, for both keyframes
-      out[x] = between.blend(row0, row1, i);
+      const bool is_hidden = seen0[x] + seen1[x] == 0;
+      hidden += is_hidden;
+      edge[x] = is_hidden ? Edge::outline : edge[x];  // it is next to an outline, for both keyframes
     }
+    unseen[static_cast<std::size_t>(y)] = hidden;
     if (detail != Detail::apart) return;
     for (int x = 0; x < width; ++x) {
       const auto i = static_cast<std::size_t>(x);
@@ -192,35 +199,35 @@ void Reprojector::refine(const Between& between, const Model& model, Reconstruct
     std::vector<int> pixels;
     for (int x = 0; x < layout_.sensor.width; ++x)
       if (surface_.edge(x, y) != Edge::none) pixels.push_back(x);
-    std::vector<float> bx, by, w;
-    std::vector<std::uint16_t> part;
+    const std::size_t count = pixels.size() * static_cast<std::size_t>(places);
+    std::vector<float> bx(count), by(count), w(count), light(count);
+    std::vector<std::uint16_t> part(objects ? count : 0);
+    std::size_t at = 0;
     for (const int x : pixels) {
       for (int j = s * y; j < s * (y + 1); ++j) {
-        for (int i = s * x; i < s * (x + 1); ++i) {
-          bx.push_back(keyframe_rays_.x(i + margin, j + margin)),
-              by.push_back(keyframe_rays_.y(i + margin, j + margin));
+        for (int i = s * x; i < s * (x + 1); ++i, ++at) {
+          bx[at] = keyframe_rays_.x(i + margin, j + margin), by[at] = keyframe_rays_.y(i + margin, j + margin);
           const Cells::Seen seen = cells_.at(i, j);
           const bool nothing = seen.nearness < 0;  // no point falls into the cell
-          w.push_back(nothing ? surface_.nearness(x, y) : seen.nearness);
-          if (objects) part.push_back(nothing ? surface_.part(x, y) : seen.part);
+          w[at] = nothing ? surface_.nearness(x, y) : seen.nearness;
+          if (objects) part[at] = nothing ? surface_.part(x, y) : seen.part;
         }
       }
     }
-    RowLookup row0(w.size()), row1(w.size());
-    between.project(project,
-                    {bx.data(), by.data(), w.data(), objects ? part.data() : nullptr, static_cast<int>(w.size())}, row0,
-                    row1);
+    RowLookup row0(count), row1(count);
+    between.project(project, {bx.data(), by.data(), w.data(), objects ? part.data() : nullptr, static_cast<int>(count)},
+                    row0, row1);
     look_up_row<true>(between.before.narrow, row0);
     look_up_row<true>(between.after.narrow, row1);
-    std::size_t i = 0;
+    between.blend(row0, row1, light.data());
+    at = 0;
     for (const int x : pixels) {
-      float seen = 0, all = 0, count = 0;
-      for (int place = 0; place < places; ++place, ++i) {
-        const float e = between.blend(row0, row1, i);
-        all += e;
-        if (row0.seen[i] + row1.seen[i] > 0) seen += e, count += 1;
+      float seen = 0, all = 0, seen_places = 0;
+      for (int place = 0; place < places; ++place, ++at) {
+        all += light[at];
+        if (row0.seen[at] + row1.seen[at] > 0) seen += light[at], seen_places += 1;
       }
-      result.irradiance(x, y) = count > 0 ? seen / count : all / static_cast<float>(places);
+      result.irradiance(x, y) = seen_places > 0 ? seen / seen_places : all / static_cast<float>(places);
     }
   });
 }

@@ -8,6 +8,8 @@
 #include <random>
 #include <vector>
 
+#include "support/sanitizers.h"
+
 namespace esim {
 namespace {
 
@@ -138,16 +140,10 @@ double kolmogorov(std::vector<double> a, std::vector<double> b) {
   return worst;
 }
 
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kSanitized = true;
-#else
-constexpr bool kSanitized = false;
-#endif
-
 /// Compares rates, alternation and intervals. The limits follow from the number of events, which come in clusters:
 /// their rates may differ by 5 standard errors of twice as many independent events, and by 3 % in any case.
 void compare(const PixelSetup& setup, const Light& light, int pixels, double duration, double h) {
-  if (kSanitized) GTEST_SKIP() << "takes minutes under sanitizers, where CircuitCamera runs the same code";
+  if (test::kSanitized) GTEST_SKIP() << "takes minutes under sanitizers, where CircuitCamera runs the same code";
   const Circuit circuit = circuit_of(setup, 3);
   std::mt19937_64 random(5);
   Counts fast, slow;

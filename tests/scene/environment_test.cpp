@@ -10,12 +10,14 @@
 #include "esim/core/error.h"
 #include "esim/scene/environment/environment.h"
 #include "esim/scene/environment/split_sum.h"
+#include "support/sanitizers.h"
 
 namespace esim {
 namespace {
 
 using Eigen::Vector3d;
 constexpr double kPi = std::numbers::pi;
+constexpr const char* kLong = "takes a minute under sanitizers, where IsContinuousEverywhere runs the same code";
 
 Vector3d direction_at(const Image<float>& image, int x, int y) {
   const double longitude = kPi - 2 * kPi * (x + 0.5) / image.width(),
@@ -70,6 +72,7 @@ TEST(Environment, IsPrefilteredForDiffuseSurfaces) {
 }
 
 TEST(Environment, IsPrefilteredForEachRoughness) {
+  if (test::kSanitized) GTEST_SKIP() << kLong;
   const Image<float> image = sky(256);
   const Environment environment({image}, 1, 0, "sky");
   for (const double roughness : {0.25, 0.375, 0.5, 0.75, 1.0}) {
@@ -111,6 +114,7 @@ TEST(Environment, IsContinuousEverywhere) {
 }
 
 TEST(Environment, TurnsCounterclockwise) {
+  if (test::kSanitized) GTEST_SKIP() << kLong;
   const Image<float> image = sky(128);
   const Environment environment({image}, 1, 0, "sky"), turned({image}, 1, kPi / 2, "sky");
   for (const Vector3d& d : directions()) {
@@ -124,6 +128,7 @@ TEST(Environment, TurnsCounterclockwise) {
 }
 
 TEST(Environment, HasAViewPerColour) {
+  if (test::kSanitized) GTEST_SKIP() << kLong;
   Planes planes(3, Image<float>(64, 32));
   for (std::size_t c = 0; c < 3; ++c) {
     for (float& value : planes[c].pixels()) value = static_cast<float>(c + 1);

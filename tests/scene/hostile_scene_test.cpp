@@ -14,6 +14,7 @@
 #include "esim/scene/scene_file.h"
 #include "glb_writer.h"
 #include "support/errors.h"
+#include "support/sanitizers.h"
 #include "support/temporary_directory.h"
 
 namespace esim {
@@ -203,10 +204,8 @@ Outcome read_damaged(const std::string& name, const std::string& content, const 
   const std::filesystem::path report = folder.path() / "report";
   const pid_t copy = fork();
   if (copy == 0) {
-#if !defined(__SANITIZE_ADDRESS__) && !defined(__SANITIZE_THREAD__)
     const rlimit limit{rlim_t{1} << 31, rlim_t{1} << 31};
-    setrlimit(RLIMIT_AS, &limit);
-#endif
+    if (!test::kSanitized) setrlimit(RLIMIT_AS, &limit);
     if (std::freopen("/dev/null", "w", stderr) == nullptr) _exit(4);  // decoders print errors there
     std::uint64_t state = 1;
     const auto random = [&](std::size_t below) {

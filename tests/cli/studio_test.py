@@ -322,6 +322,27 @@ class Answers(StudioTest):
             self.assertEqual({s["metallicFactor"] for s in surfaces.values()}, {0})
             self.assertAlmostEqual(surfaces["glaze"]["roughnessFactor"], expected, places=6)
 
+    def test_the_light_of_an_environment_is_a_file(self):
+        (self.work / "plate.obj").write_text("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
+        (self.work / "sky.ppm").write_bytes(b"P6 4 2 255\n" + bytes([255, 0, 0] + 7 * [0, 255, 0]))
+        (self.work / "square.ppm").write_bytes(b"P6 2 2 255\n" + bytes(12))
+
+        def scene(lighting, status=200):
+            yaml = f"renderer: {{type: mesh, scene: plate.obj, lighting: {lighting}}}\n"
+            return self.ask("POST", "/api/scene", {"yaml": yaml, "dir": "work"}, status)
+
+        light = scene("{type: pbr, environment: {image: sky.ppm, strength: 3}}")["environment"]
+        self.assertEqual((light["width"], light["height"]), (4, 2))
+        status, headers, body = self.server.request("GET", light["file"])
+        self.assertEqual((status, headers["Content-Type"]), (200, "application/octet-stream"))
+        self.assertEqual(struct.unpack("<24e", body), (1, 0, 0) + 7 * (0, 1, 0))
+        self.assertEqual(self.server.request("GET", light["file"], token=False)[0], 401)
+        dark = scene("{type: pbr}")
+        self.assertIsNone(dark["environment"])
+        self.assertEqual(self.server.request("GET", dark["glb"].replace(".glb", "/environment.light"))[0], 404)
+        for image, reason in (("square.ppm", "twice as wide as high"), ("absent.hdr", "absent.hdr")):
+            self.assertIn(reason, scene(f"{{type: pbr, environment: {{image: {image}}}}}", 400)["error"])
+
     def test_the_motion_is_the_simulators(self):
         motion = self.ask("POST", "/api/trajectory", self.scenario(samples=11))
         self.assertEqual(len(motion["poses"]), 11)

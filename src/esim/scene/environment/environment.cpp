@@ -19,10 +19,13 @@ constexpr int kSmallest = 64, kLargest = 1024;
 constexpr std::array<int, Environment::kLevels - 1> kSizes = {256, 128, 128, 64, 64, 64, 64, 64};
 constexpr std::array<unsigned, Environment::kLevels - 1> kDirections = {256, 512, 512, 1024, 1024, 1024, 1024, 1024};
 
+/// The radiance of all views, whose maps are computed together.
+using Radiance = Eigen::Array4f;
+
 /// Maps of half the size each, so that a mean over any solid angle is a single look-up.
 class Pyramid {
  public:
-  Pyramid(const OctahedralLayout& first, const float* values) {
+  Pyramid(const OctahedralLayout& first, const Radiance* values) {
     OctahedralLayout layout{first.size, 0};
     values_.assign(values + first.offset, values + first.offset + first.value_count());
     layouts_.push_back(layout);
@@ -32,7 +35,8 @@ class Pyramid {
       values_.resize(values_.size() + layout.value_count());
       for (int row = 0; row < layout.size; ++row) {
         for (int column = 0; column < layout.size; ++column) {
-          float sum = 0, weights = 0;
+          Radiance sum = Radiance::Zero();
+          float weights = 0;
           for (int k = 0; k < 4; ++k) {
             const int x = 2 * column + k % 2, y = 2 * row + k / 2;
             const float weight = finer.centre(x, y).solid_angle_weight();
@@ -47,10 +51,10 @@ class Pyramid {
   }
 
   /// The value around a place; `level` 0 is the finest.
-  float value(const OctahedralPlace& at, float level) const {
+  Radiance value(const OctahedralPlace& at, float level) const {
     const float last = static_cast<float>(layouts_.size() - 1), clamped = std::min(std::max(level, 0.0F), last);
     const auto finer = static_cast<std::size_t>(std::min(clamped, last - 1));
-    const float a = layouts_[finer].value(values_.data(), at), b = layouts_[finer + 1].value(values_.data(), at);
+    const Radiance a = layouts_[finer].value(values_.data(), at), b = layouts_[finer + 1].value(values_.data(), at);
     return a + (clamped - static_cast<float>(finer)) * (b - a);
   }
 
@@ -60,12 +64,12 @@ class Pyramid {
     while (layouts_[i].size > size) ++i;
     return layouts_[i];
   }
-  const float* values() const { return values_.data(); }
+  const Radiance* values() const { return values_.data(); }
   int size() const { return layouts_[0].size; }
 
  private:
   std::vector<OctahedralLayout> layouts_;
-  std::vector<float> values_;
+  std::vector<Radiance> values_;
 };
 
 /// A frame of unit vectors whose third is `z` (Duff et al., "Building an orthonormal basis, revisited", JCGT 2017).
@@ -113,17 +117,17 @@ std::vector<LobeSample> lobe(float roughness, unsigned count, int pyramid_size) 
 }
 
 template <class Function>
-void fill(const OctahedralLayout& map, const Workers& workers, float* values, const Function& value) {
+void fill(const OctahedralLayout& map, const Workers& workers, Radiance* values, const Function& value) {
   workers.for_each(map.size, [&](int row) {
-    for (int column = 0; column < map.size; ++column)
-      map.texel(values, column, row) = value(map.centre(column, row).direction());
+    for (int column = 0; column < map.size; ++column) map.texel(values, column, row) = value(column, row);
   });
   map.fold(values);
 }
 
-float filtered(const Pyramid& pyramid, const std::vector<LobeSample>& lobe, const Eigen::Vector3f& axis) {
+Radiance filtered(const Pyramid& pyramid, const std::vector<LobeSample>& lobe, const Eigen::Vector3f& axis) {
   const Eigen::Matrix3f frame = frame_around(axis);
-  float sum = 0, weights = 0;
+  Radiance sum = Radiance::Zero();
+  float weights = 0;
   for (const LobeSample& sample : lobe) {
     const Eigen::Vector3f d = frame * sample.direction;
     sum += sample.weight * pyramid.value(OctahedralPlace::of(d.x(), d.y(), d.z()), sample.level);
@@ -132,19 +136,81 @@ float filtered(const Pyramid& pyramid, const std::vector<LobeSample>& lobe, cons
   return sum / weights;
 }
 
-/// The mean weighted by the cosine, by all texels of a small map.
-float diffuse_mean(const Pyramid& pyramid, const Eigen::Vector3f& normal) {
-  const OctahedralLayout& map = pyramid.at_most(kSmallest);
-  float sum = 0, weights = 0;
-  for (int row = 0; row < map.size; ++row) {
-    for (int column = 0; column < map.size; ++column) {
-      const OctahedralPlace centre = map.centre(column, row);
-      const float weight = centre.solid_angle_weight() * std::max(centre.direction().dot(normal), 0.0F);
-      sum += weight * map.texel(pyramid.values(), column, row), weights += weight;
+/// Means weighted by the cosine, by all texels of a small map.
+class DiffuseLobe {
+ public:
+  explicit DiffuseLobe(const Pyramid& pyramid) {
+    const OctahedralLayout& map = pyramid.at_most(kSmallest);
+    for (int row = 0; row < map.size; ++row) {
+      for (int column = 0; column < map.size; ++column) {
+        const OctahedralPlace centre = map.centre(column, row);
+        texels_.push_back({map.texel(pyramid.values(), column, row), centre.direction(), centre.solid_angle_weight()});
+      }
     }
   }
-  return sum / weights;
-}
+
+  Radiance mean(const Eigen::Vector3f& normal) const {
+    Radiance sum = Radiance::Zero();
+    float weights = 0;
+    for (const Texel& texel : texels_) {
+      const float weight = texel.weight * std::max(texel.direction.dot(normal), 0.0F);
+      sum += weight * texel.radiance, weights += weight;
+    }
+    return sum / weights;
+  }
+
+ private:
+  struct Texel {
+    Radiance radiance;
+    Eigen::Vector3f direction;
+    float weight;
+  };
+  std::vector<Texel> texels_;
+};
+
+/// Equirectangular images of the same size, turned around z.
+class TurnedImages {
+ public:
+  TurnedImages(std::span<const Image<float>> views, double rotation_rad)
+      : views_(views), rotation_(static_cast<float>(rotation_rad)) {}
+
+  /// The mean at several places in a texel of a map.
+  Radiance mean(const OctahedralLayout& map, int column, int row) const {
+    const int side = std::clamp(2 * views_[0].height() / map.size, 2, 16);
+    const float per = 1 / static_cast<float>(map.size * side);
+    Radiance sum = Radiance::Zero();
+    for (int k = 0; k < side * side; ++k) {
+      const OctahedralPlace place{(static_cast<float>(column * side + k % side) + 0.5F) * per,
+                                  (static_cast<float>(row * side + k / side) + 0.5F) * per};
+      sum += bilinear(place.direction());
+    }
+    return sum / static_cast<float>(side * side);
+  }
+
+ private:
+  Radiance bilinear(const Eigen::Vector3f& d) const {
+    constexpr float kPi = std::numbers::pi_v<float>;
+    const float longitude = std::atan2(d.y(), d.x()) - rotation_;
+    const float latitude = std::atan2(d.z(), std::hypot(d.x(), d.y()));
+    const float u = 0.5F - longitude / (2 * kPi), v = 0.5F - latitude / kPi;
+    const int width = views_[0].width(), height = views_[0].height();
+    const float x = (u - std::floor(u)) * static_cast<float>(width) - 0.5F;
+    const float y = std::clamp(v * static_cast<float>(height) - 0.5F, 0.0F, static_cast<float>(height - 1));
+    const int left = static_cast<int>(std::floor(x)), top = std::min(static_cast<int>(y), std::max(height - 2, 0));
+    const float s = x - static_cast<float>(left), t = y - static_cast<float>(top);
+    const int column0 = (left + width) % width, column1 = (left + 1) % width, bottom = std::min(top + 1, height - 1);
+    Radiance values = Radiance::Zero();
+    for (std::size_t i = 0; i < views_.size(); ++i) {
+      const Image<float>& image = views_[i];
+      values[static_cast<Eigen::Index>(i)] = (1 - t) * ((1 - s) * image(column0, top) + s * image(column1, top)) +
+                                             t * ((1 - s) * image(column0, bottom) + s * image(column1, bottom));
+    }
+    return values;
+  }
+
+  std::span<const Image<float>> views_;
+  float rotation_;
+};
 
 }  // namespace
 
@@ -174,58 +240,28 @@ Environment::Environment(const Planes& planes, float strength, double rotation_r
                         name, value));
     }
     skies_[view_count_++] = std::make_shared<const Texture>(view, Wrap::repeat, Wrap::clamp);
-    const std::vector<float> values = prefiltered(view);
-    values_.insert(values_.end(), values.begin(), values.end());
   }
+  prefilter(views);
 }
 
-std::vector<float> Environment::prefiltered(const Image<float>& image) const {
-  std::vector<float> values(view_size_);
-  turn(image, values.data());
-  Pyramid pyramid(levels_[0], values.data());
+void Environment::prefilter(std::span<const Image<float>> views) {
   const Workers workers(0);
-  fill(kDiffuse, workers, values.data(), [&](const Eigen::Vector3f& normal) { return diffuse_mean(pyramid, normal); });
+  std::vector<Radiance> maps(view_size_);
+  const TurnedImages images(views, rotation_rad_);
+  fill(levels_[0], workers, maps.data(), [&](int column, int row) { return images.mean(levels_[0], column, row); });
+  const Pyramid pyramid(levels_[0], maps.data());
+  const DiffuseLobe diffuse(pyramid);
+  fill(kDiffuse, workers, maps.data(),
+       [&](int column, int row) { return diffuse.mean(kDiffuse.centre(column, row).direction()); });
   for (std::size_t i = 1; i < levels_.size(); ++i) {
     const std::vector<LobeSample> samples =
         lobe(static_cast<float>(i) / (kLevels - 1), kDirections[i - 1], pyramid.size());
-    fill(levels_[i], workers, values.data(),
-         [&](const Eigen::Vector3f& axis) { return filtered(pyramid, samples, axis); });
+    fill(levels_[i], workers, maps.data(),
+         [&](int column, int row) { return filtered(pyramid, samples, levels_[i].centre(column, row).direction()); });
   }
-  return values;
-}
-
-/// Fills the sharpest map: each texel is the mean of an image at several places in it.
-void Environment::turn(const Image<float>& image, float* values) const {
-  const OctahedralLayout& map = levels_[0];
-  const int side = std::clamp(2 * image.height() / map.size, 2, 16);
-  const auto turned = static_cast<float>(rotation_rad_);
-  constexpr float kPi = std::numbers::pi_v<float>;
-  const auto bilinear = [&](const Eigen::Vector3f& d) {
-    const float longitude = std::atan2(d.y(), d.x()) - turned;
-    const float latitude = std::atan2(d.z(), std::hypot(d.x(), d.y()));
-    const float u = 0.5F - longitude / (2 * kPi), v = 0.5F - latitude / kPi;
-    const int width = image.width(), height = image.height();
-    const float x = (u - std::floor(u)) * static_cast<float>(width) - 0.5F;
-    const float y = std::clamp(v * static_cast<float>(height) - 0.5F, 0.0F, static_cast<float>(height - 1));
-    const int left = static_cast<int>(std::floor(x)), top = std::min(static_cast<int>(y), std::max(height - 2, 0));
-    const float s = x - static_cast<float>(left), t = y - static_cast<float>(top);
-    const int column0 = (left + width) % width, column1 = (left + 1) % width, bottom = std::min(top + 1, height - 1);
-    return (1 - t) * ((1 - s) * image(column0, top) + s * image(column1, top)) +
-           t * ((1 - s) * image(column0, bottom) + s * image(column1, bottom));
-  };
-  for (int row = 0; row < map.size; ++row) {
-    for (int column = 0; column < map.size; ++column) {
-      float sum = 0;
-      for (int k = 0; k < side * side; ++k) {
-        const float per = 1 / static_cast<float>(map.size * side);
-        const OctahedralPlace place{(static_cast<float>(column * side + k % side) + 0.5F) * per,
-                                    (static_cast<float>(row * side + k / side) + 0.5F) * per};
-        sum += bilinear(place.direction());
-      }
-      map.texel(values, column, row) = sum / static_cast<float>(side * side);
-    }
+  for (std::size_t view = 0; view < view_count_; ++view) {
+    for (const Radiance& radiance : maps) values_.push_back(radiance[static_cast<Eigen::Index>(view)]);
   }
-  map.fold(values);
 }
 
 Planes load_environment_image(const std::filesystem::path& file, bool colour) {

@@ -57,8 +57,7 @@ class Environment {
  private:
   static constexpr OctahedralLayout kDiffuse{64, 0};
 
-  std::vector<float> prefiltered(const Image<float>& image) const;
-  void turn(const Image<float>& image, float* values) const;
+  void prefilter(std::span<const Image<float>> views);
 
   double rotation_rad_;
   std::array<OctahedralLayout, kLevels> levels_;

@@ -47,17 +47,18 @@ struct OctahedralLayout {
   std::size_t row_length() const { return static_cast<std::size_t>(size) + 2; }
   std::size_t value_count() const { return row_length() * row_length(); }
 
-  /// The interpolated value at a place.
-  float value(const float* values, const OctahedralPlace& at) const {
+  /// The interpolated value at a place; Value: float, or an Eigen array.
+  template <typename Value>
+  Value value(const Value* values, const OctahedralPlace& at) const {
     const auto count = static_cast<float>(size);
     // In the square, also for NaN.
     const float x = std::min(std::max(0.0F, at.u * count + 0.5F), count + 0.5F);
     const float y = std::min(std::max(0.0F, at.v * count + 0.5F), count + 0.5F);
     const int column = static_cast<int>(x), row = static_cast<int>(y);
     const float s = x - static_cast<float>(column), t = y - static_cast<float>(row);
-    const float* const upper = values + offset + static_cast<std::size_t>(row) * row_length() + column;
-    const float* const lower = upper + row_length();
-    const float above = upper[0] + s * (upper[1] - upper[0]), below = lower[0] + s * (lower[1] - lower[0]);
+    const Value* const upper = values + offset + static_cast<std::size_t>(row) * row_length() + column;
+    const Value* const lower = upper + row_length();
+    const Value above = upper[0] + s * (upper[1] - upper[0]), below = lower[0] + s * (lower[1] - lower[0]);
     return above + t * (below - above);
   }
 
@@ -71,7 +72,8 @@ struct OctahedralLayout {
   }
 
   /// Fills the texels around the square from those in it.
-  void fold(float* values) const {
+  template <typename Value>
+  void fold(Value* values) const {
     const auto outside = [&](int column, int row) {
       int from_column = column, from_row = row;
       if (column < 0 || column >= size) from_row = size - 1 - from_row, from_column = std::clamp(column, 0, size - 1);

@@ -541,7 +541,7 @@ TEST(Splats, DamagedFilesDoNotCrash) {
   for (const auto& [name, content] : small_files()) {
     const auto path = folder.write(name, content);
     std::fstream file(path, std::ios::binary | std::ios::in | std::ios::out);
-    const auto put = [&](std::size_t at, int bits) {
+    const auto put = [&file, &content = content](std::size_t at, int bits) {
       file.seekp(static_cast<std::streamoff>(at)).put(static_cast<char>(content[at] ^ bits)).flush();
     };
     for (std::size_t at = 0; at < content.size(); ++at) {

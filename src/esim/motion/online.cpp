@@ -33,9 +33,9 @@ OnlineTrajectory::OnlineTrajectory(const OnlineMotionOptions& options, const SE3
     : options_(checked(options)), controls_(static_cast<std::size_t>(options.order - 1), checked(T_world_body)) {}
 
 void OnlineTrajectory::push(const SE3& T_world_body) {
-  constexpr double kLargestTurn_rad = 0.999 * std::numbers::pi;
+  constexpr double kNearlyHalfTurn_rad = 0.999 * std::numbers::pi;
   const SE3& last = controls_.back();
-  if (so3_log((last.rotation.conjugate() * checked(T_world_body).rotation).normalized()).norm() > kLargestTurn_rad)
+  if (so3_log((last.rotation.conjugate() * checked(T_world_body).rotation).normalized()).norm() > kNearlyHalfTurn_rad)
     throw UserError("online motion: the body turns by 180 deg from one pushed pose to the next; push poses more often");
   velocity_ = (T_world_body.translation - last.translation) / to_seconds(options_.interval);
   controls_.push_back(T_world_body);

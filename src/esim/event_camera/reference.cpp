@@ -330,9 +330,11 @@ std::optional<Labelled> ReferenceEventCamera::Model::next_event(std::size_t i, c
     if (refractory_ > 0 && !readout) pixel.busy_until = t + refractory_;
     // (12) The time stamp.
     const auto pixels_per_row = static_cast<std::size_t>(width_);
+    EventLabel explained;
+    explain(label, pixel.hot, explained);
     return Labelled{{t + delay(pixel, signal.light(tau)), static_cast<std::uint16_t>(i % pixels_per_row),
                      static_cast<std::uint16_t>(i / pixels_per_row), static_cast<std::int8_t>(polarity)},
-                    to_label(label, pixel.hot)};
+                    explained};
   }
 }
 

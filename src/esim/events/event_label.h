@@ -54,14 +54,12 @@ inline EventCause largest_part(const EventLabel& label, int polarity) {
   return cause;
 }
 
-/// The label without what the pixel saw.
-inline EventLabel to_label(const NewLabel& event, bool hot) {
-  EventLabel label;
+/// Fills a new label, except what the pixel saw.
+inline void explain(const NewLabel& event, bool hot, EventLabel& label) {
   label.t_ideal = event.t_ideal;
   label.signal = event.signal, label.noise = event.noise, label.leak = event.leak;
   label.hot = hot ? 1 : 0;
   label.cause = event.is_noise != 0 ? EventCause::noise : largest_part(label, event.polarity);
-  return label;
 }
 
 }  // namespace esim::inline events

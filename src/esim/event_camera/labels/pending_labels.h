@@ -30,6 +30,8 @@ class PendingLabels {
 
   /// The request has been read at `t`, the new time stamp.
   void read(const Event& request, TimeNs t);
+  /// The same for several: read[i] is what became of requests[i].
+  void read(EventSpan requests, EventSpan read);
   /// The request is lost.
   void drop(const Event& request);
   /// All requests of a pixel that have not been read are lost.
@@ -51,7 +53,7 @@ class PendingLabels {
   bool restore(std::span<const Waiting> labels);
 
  private:
-  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max();
+  static constexpr std::uint32_t kNone = std::numeric_limits<std::uint32_t>::max(), kRemoved = kNone - 1;
 
   struct Node {
     NewLabel label;
@@ -63,7 +65,10 @@ class PendingLabels {
   };
 
   std::uint32_t pixel_of(const Event& event) const { return static_cast<std::uint32_t>(event.y) * width_ + event.x; }
+  template <class Body>
+  void for_each(EventSpan events, const Body& body);
   void insert(const NewLabel& label, bool was_read);
+  void forget_removed();
   /// The node before the event's (kNone: it is the first) and the event's. Throws InternalError if it does not exist.
   std::pair<std::uint32_t, std::uint32_t> find(const Event& event, bool was_read) const;
   void remove(List& list, std::uint32_t before, std::uint32_t node);
@@ -71,8 +76,9 @@ class PendingLabels {
   std::uint32_t width_;
   std::vector<bool> hot_;
   std::vector<List> lists_;  // per pixel
-  std::vector<Node> nodes_;
-  std::uint32_t free_ = kNone;  // list of unused nodes
+  std::vector<Node> nodes_;  // in the order of add(), so that new ones are written to memory one after another
+  std::size_t removed_ = 0;  // of nodes_
+  std::vector<Node> spare_;
 };
 
 }  // namespace esim::inline event_camera

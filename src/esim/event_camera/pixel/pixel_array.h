@@ -55,6 +55,7 @@ class PixelArray {
       __builtin_prefetch(&clean_pixels[pixel], 1);
     } else {
       __builtin_prefetch(&noisy_pixels[pixel], 1);
+      if (!set_at.empty()) __builtin_prefetch(&set_at[pixel], 1);
     }
   }
 

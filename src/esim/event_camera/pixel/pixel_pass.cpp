@@ -147,15 +147,13 @@ void PixelPass<Signals>::label(PackedEvents& events) const {
   for (std::size_t i = 0; i < compare.count; ++i) {
     if (reports_[i] == 0) continue;
     const double crossing = std::clamp(std::floor(compare.tau[i] + 0.5), 1.0, round_.duration);
-    events.labels.push_back({t0_ + static_cast<TimeNs>(round_.stamp[i]),
-                             t0_ + static_cast<TimeNs>(crossing),
-                             round_.active->pixel[i],
-                             signal_[i],
-                             noise_[i],
-                             leak_[i],
-                             static_cast<std::int8_t>(compare.polarity[i]),
-                             round_.own[i],
-                             {}});
+    NewLabel& label = events.labels.emplace_back();
+    label.t = t0_ + static_cast<TimeNs>(round_.stamp[i]);
+    label.t_ideal = t0_ + static_cast<TimeNs>(crossing);
+    label.pixel = round_.active->pixel[i];
+    label.signal = signal_[i], label.noise = noise_[i], label.leak = leak_[i];
+    label.polarity = static_cast<std::int8_t>(compare.polarity[i]);
+    label.is_noise = round_.own[i];
   }
 }
 

@@ -61,10 +61,9 @@ inline void PixelReadout::read_prompt(TimeNs watermark) {
   if (!holds_ || counted_ || !again_.empty() || !resuming_.empty()) return;
   const std::size_t begin = read_.size();
   const std::size_t count = readout_.serve_singly(arrived_.subspan(next_), watermark + 1, tolerance_, read_);
-  for (std::size_t i = 0; i < count; ++i) {
+  for (std::size_t i = 0; i < count; ++i)
     longest_delay_ = std::max(longest_delay_, read_[begin + i].t - arrived_[next_ + i].t);
-    if (labels_ != nullptr) labels_->read(arrived_[next_ + i], read_[begin + i].t);
-  }
+  if (labels_ != nullptr) labels_->read(arrived_.subspan(next_, count), EventSpan(read_).subspan(begin));
   next_ += count;
 }
 

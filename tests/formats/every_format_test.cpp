@@ -1,5 +1,6 @@
 // Requirements for every format of events. The tests cover every format in the list of all_formats().
 #include <gtest/gtest.h>
+#include <hdf5.h>
 
 #include <algorithm>
 
@@ -148,6 +149,7 @@ TEST_P(EveryFormat, DamagedAnywhereItDoesNoHarm) {
     for (std::uint64_t k = random() % 4 + 1; k > 0; --k) damaged[random() % bytes.size()] = static_cast<char>(random());
     std::ofstream(file, std::ios::binary) << damaged;
     expect_no_harm(path, events, false);
+    EXPECT_EQ(H5Fget_obj_count(H5F_OBJ_ALL, H5F_OBJ_ALL), 0) << "HDF5 objects were left open";
   }
 }
 

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <complex>
@@ -10,6 +11,9 @@
 #include <numbers>
 #include <random>
 #include <string>
+#include <utility>
+
+#include "esim/core/error.h"
 
 namespace esim {
 namespace {
@@ -45,6 +49,64 @@ TEST(Texture, ASmallFootprintInterpolatesTexels) {
     }
   }
   EXPECT_NEAR(texture.sample(lookup(0.5F / 16, -0.4F, tiny, 0, 0, tiny))[0], texels(0, 0), 3e-4) << "clamps";
+}
+
+/// The texel that continues a row or column.
+int continued(int i, int size, Wrap wrap) {
+  return wrap == Wrap::clamp ? std::clamp(i, 0, size - 1) : (i % size + size) % size;
+}
+
+/// The 4 x 4 taps of a footprint of two by two texels, one after another.
+double mean_of_taps(const Image<float>& texels, float u, float v, Wrap wrap_u, Wrap wrap_v) {
+  const hwy::HWY_NAMESPACE::CappedTag<float, 1> d;
+  namespace hn = hwy::HWY_NAMESPACE;
+  const BoxFilter filter(d, hn::Set(d, 4.0F), hn::Zero(d));
+  const auto taps = [&](float coordinate, int size, Wrap wrap) {
+    const float part = wrap == Wrap::repeat ? coordinate - std::floor(coordinate) : coordinate;
+    const float x = part * static_cast<float>(size) - 0.5F;
+    const auto w = filter.weights(hn::Set(d, x - std::floor(x)));
+    std::array<std::pair<int, float>, 4> out;
+    const std::array<float, 4> weights{hn::GetLane(w.first), hn::GetLane(w.second), hn::GetLane(w.third),
+                                       hn::GetLane(w.fourth)};
+    for (int i = 0; i < 4; ++i) {
+      const int tap = static_cast<int>(std::floor(x)) - 1 + i;
+      out[static_cast<std::size_t>(i)] = {continued(tap, size, wrap), weights[static_cast<std::size_t>(i)]};
+    }
+    return out;
+  };
+  double sum = 0;
+  for (const auto& [y, down] : taps(v, texels.height(), wrap_v)) {
+    for (const auto& [x, across] : taps(u, texels.width(), wrap_u)) sum += double{down} * double{across} * texels(x, y);
+  }
+  return sum;
+}
+
+TEST(Texture, EqualsItsTapsAcrossBlocksAndEdges) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> anywhere(-1.2F, 2.2F);
+  const std::array<std::pair<int, int>, 9> sizes{
+      {{1, 1}, {1, 200}, {200, 1}, {25, 57}, {26, 58}, {29, 61}, {32, 64}, {61, 130}, {333, 100}}};
+  for (const auto& [width, height] : sizes) {
+    const Image<float> texels = noise(width, height, 6);
+    for (const Wrap wrap_u : {Wrap::repeat, Wrap::clamp}) {
+      for (const Wrap wrap_v : {Wrap::repeat, Wrap::clamp}) {
+        const Texture texture(texels, wrap_u, wrap_v);
+        const Image<float> kept = texture.texels();
+        for (int i = 0; i < 300; ++i) {
+          const float u = anywhere(random), v = anywhere(random);
+          const float found =
+              texture.sample(lookup(u, v, 2 / static_cast<float>(width), 0, 0, 2 / static_cast<float>(height)))[0];
+          EXPECT_NEAR(found, mean_of_taps(kept, u, v, wrap_u, wrap_v), 2e-4)
+              << width << " x " << height << " texels at " << u << ", " << v;
+        }
+        for (std::size_t i = 0; i < texels.size(); ++i) EXPECT_NEAR(kept.pixels()[i], texels.pixels()[i], 2e-4);
+      }
+    }
+  }
+}
+
+TEST(Texture, RefusesStripsThatTakeTooMuchMemory) {
+  EXPECT_THROW(Texture(Image<float>(6'000'000, 2), Wrap::repeat, Wrap::repeat), UserError);
 }
 
 TEST(Texture, ALargeFootprintAverages) {

@@ -6,6 +6,9 @@
 #include <limits>
 #include <numbers>
 #include <opencv2/imgproc.hpp>
+#include <string>
+
+#include "esim/core/error.h"
 
 namespace esim::inline scene {
 namespace {
@@ -37,10 +40,17 @@ Texture::Texture(const Image<float>& texels, Wrap wrap_u, Wrap wrap_v) : wrap_u_
     return light;
   });
   scale_ = scale_for(brightest);
-  // Enough for all levels: together, they have twice the area of the first, and 3.4 times its sides.
-  constexpr std::size_t kBeyond = kBefore + kAfter;
-  const std::size_t sides = static_cast<std::size_t>(texels.width()) + static_cast<std::size_t>(texels.height());
-  codes_.reserve(2 * texels.size() + 4 * kBeyond * sides + kMaxLevels * kBeyond * kBeyond);
+  std::size_t enough = 0;  // for all levels
+  const double largest = std::max(texels.width(), texels.height());
+  for (double reduction = 1; reduction < std::numbers::sqrt2 * largest; reduction *= std::numbers::sqrt2) {
+    const auto reduced_side = [&](int side) { return static_cast<int>(std::ceil(side / reduction)); };
+    enough += codes(reduced_side(texels.width()), reduced_side(texels.height())) + kBlockBytes / 2;
+  }
+  if (enough > std::numeric_limits<std::int32_t>::max() / sizeof(codes_[0])) {
+    throw UserError("a texture of " + std::to_string(texels.width()) + " x " + std::to_string(texels.height()) +
+                    " px takes more than 2 GiB of memory; make its longer side shorter");
+  }
+  codes_.reserve(enough);
 
   // The square width, in texels of the level, over which the texels of each level average those of the first.
   std::array<float, kMaxLevels> averaged{};
@@ -65,24 +75,52 @@ Texture::Texture(const Image<float>& texels, Wrap wrap_u, Wrap wrap_v) : wrap_u_
   }
 }
 
+/// How many blocks of this width (height) the columns (rows) of taps need.
+int Texture::blocks(int texels, int block) { return (texels + kBefore) / (block - kOverlap) + 1; }
+
+/// The size of a level: of the last block, only the rows in use.
+std::size_t Texture::codes(int width, int height) {
+  const int columns = blocks(width, kBlockWidth), rows = blocks(height, kBlockHeight);
+  const int last = kBefore + height + kAfter - (rows - 1) * (kBlockHeight - kOverlap);
+  return (static_cast<std::size_t>(columns) * static_cast<std::size_t>(rows) - 1) * (kBlockWidth * kBlockHeight) +
+         static_cast<std::size_t>(last) * kBlockWidth;
+}
+
 /// Stores the next level with its continuations.
 void Texture::append(const cv::Mat& level) {
+  constexpr std::size_t kCodes = kBlockBytes / sizeof(codes_[0]);  // of a block
   const auto index = static_cast<unsigned>(levels_++);
-  const int width = level.cols, height = level.rows, stride = kBefore + width + kAfter;
-  level_offset_[index] = static_cast<std::int32_t>(codes_.size() * sizeof(codes_[0]));
-  level_stride_[index] = static_cast<std::int32_t>(static_cast<std::size_t>(stride) * sizeof(codes_[0]));
+  const int width = level.cols, height = level.rows;
+  const int columns = blocks(width, kBlockWidth), rows = blocks(height, kBlockHeight);
+  const std::size_t needed = codes(width, height);
+  // Blocks begin with pages.
+  const std::size_t begin = needed > kCodes ? (codes_.size() + kCodes - 1) / kCodes * kCodes : codes_.size();
+  codes_.resize(begin + needed);
+  level_offset_[index] = static_cast<std::int32_t>(begin * sizeof(codes_[0]));
+  level_stride_[index] = columns * kBlockBytes;
   level_width_[index] = static_cast<float>(width), level_height_[index] = static_cast<float>(height);
   const float reduction_u = level_width_[index] / level_width_[0],
               reduction_v = level_height_[index] / level_height_[0];
   level_squared_u_[index] = reduction_u * reduction_u, level_squared_v_[index] = reduction_v * reduction_v;
-  for (int y = -kBefore; y < height + kAfter; ++y) {
-    const float* const row = level.ptr<float>(continued(y, height, wrap_v_));
-    const std::size_t first = codes_.size();
-    codes_.resize(first + static_cast<std::size_t>(stride));
-    std::uint16_t* const codes = &codes_[first + kBefore];
-    for (int x = 0; x < width; ++x) codes[x] = encode(row[x]);
-    for (int x = -kBefore; x < 0; ++x) codes[x] = codes[continued(x, width, wrap_u_)];
-    for (int x = width; x < width + kAfter; ++x) codes[x] = codes[continued(x, width, wrap_u_)];
+
+  std::vector<std::uint16_t> line(static_cast<std::size_t>(columns * (kBlockWidth - kOverlap) + kOverlap));
+  for (int block_row = 0; block_row < rows; ++block_row) {
+    const int first = block_row * (kBlockHeight - kOverlap);
+    for (int k = 0; k < std::min(kBlockHeight, kBefore + height + kAfter - first); ++k) {
+      const float* const row = level.ptr<float>(continued(first + k - kBefore, height, wrap_v_));
+      for (int x = 0; x < width; ++x) line[static_cast<std::size_t>(kBefore + x)] = encode(row[x]);
+      const auto copy = [&](int x) {
+        line[static_cast<std::size_t>(kBefore + x)] =
+            line[static_cast<std::size_t>(kBefore + continued(x, width, wrap_u_))];
+      };
+      for (int x = -kBefore; x < 0; ++x) copy(x);
+      for (int x = width; x < static_cast<int>(line.size()) - kBefore; ++x) copy(x);
+      for (int block = 0; block < columns; ++block) {
+        const auto blocks_before = static_cast<std::size_t>(block_row * columns + block);
+        std::copy_n(line.begin() + block * (kBlockWidth - kOverlap), kBlockWidth,
+                    codes_.begin() + static_cast<std::ptrdiff_t>(begin + blocks_before * kCodes) + k * kBlockWidth);
+      }
+    }
   }
 }
 
@@ -136,11 +174,14 @@ std::uint16_t Texture::encode(float value) const {
 
 Image<float> Texture::texels() const {
   Image<float> image(width(), height());
-  const auto stride = static_cast<std::size_t>(level_stride_[0]) / sizeof(codes_[0]);
+  const hwy::HWY_NAMESPACE::CappedTag<float, 1> d;
+  namespace hn = hwy::HWY_NAMESPACE;
+  const auto level = grid(d, hn::Zero(hn::RebindToSigned<decltype(d)>()));
   for (int y = 0; y < height(); ++y) {
     for (int x = 0; x < width(); ++x) {
-      const std::uint32_t code =
-          codes_[static_cast<std::size_t>(y + kBefore) * stride + static_cast<std::size_t>(x + kBefore)];
+      const auto column = hn::Set(d, static_cast<float>(x + kBefore)),
+                 row = hn::Set(d, static_cast<float>(y + kBefore));
+      const std::uint32_t code = codes_[static_cast<std::size_t>(hn::GetLane(position(d, column, row, level))) / 2];
       image(x, y) = scale_ * std::bit_cast<float>((code << kCodeShift) + kCodeBias);
     }
   }

@@ -235,6 +235,7 @@ HWY_INLINE auto Texture::two_texels(D d, I position) const {
   return decoded(d, hn::GatherOffset(du, reinterpret_cast<const std::uint32_t*>(codes_.data()), position));
 }
 
+#if HWY_TARGET != HWY_SCALAR  // programs that include this header may be compiled without vectors
 /// The words at these bytes after `from`. Single loads are faster than gathering words of this size.
 template <class D>
 HWY_INLINE auto Texture::words(D d, const char* from, const std::int32_t* bytes) {
@@ -246,6 +247,7 @@ HWY_INLINE auto Texture::words(D d, const char* from, const std::int32_t* bytes)
     return hn::Combine(d, words(half, from, bytes + hn::MaxLanes(half)), words(half, from, bytes));
   }
 }
+#endif
 
 /// Four neighbouring texels of a row, from these bytes after `from` on.
 template <class D>
@@ -253,7 +255,6 @@ HWY_INLINE auto Texture::four_texels(D d, const char* from, const std::int32_t* 
   namespace hn = hwy::HWY_NAMESPACE;
   const hn::RebindToUnsigned<D> du;
 #if HWY_TARGET == HWY_SCALAR
-  // For programs that include this header and are compiled without vectors.
   const auto two = [&](const char* at) {
     return decoded(d, hn::LoadU(du, reinterpret_cast<const std::uint32_t*>(at + *bytes)));
   };

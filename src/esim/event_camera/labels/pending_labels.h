@@ -78,7 +78,7 @@ class PendingLabels {
   std::vector<List> lists_;  // per pixel
   std::vector<Node> nodes_;  // in the order of add(), so that new ones are written to memory one after another
   std::size_t removed_ = 0;  // of nodes_
-  std::vector<Node> spare_;
+  std::vector<Node> spare_;  // memory for forget_removed()
 };
 
 }  // namespace esim::inline event_camera

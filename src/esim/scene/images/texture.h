@@ -37,8 +37,8 @@ struct TextureLookup {
 /// with the widths of the footprint along u and v; a long or slanted footprint takes several such probes along its
 /// longer side. All weights are >= 0, so that nothing rings around bright light.
 ///
-/// Rendering is limited by memory: levels are stored in blocks of one page of memory, which overlap, so that the 4 x 4
-/// taps of a probe lie in one block. And a texel is stored in 16 bits: an unsigned floating-point number with
+/// Rendering waits for memory more than it computes. So the levels are stored in overlapping blocks of one page of
+/// memory: the 4 x 4 taps of a probe lie in one block. And a texel has 16 bits: an unsigned floating-point number with
 /// 11 bits of mantissa, relative to the brightest texel. The relative error is at most 2^-12, far below that of 8-bit
 /// images, down to 2^-31 of the brightest texel; darker texels are raised to that. Values that are negative or not a
 /// number become 0.
